@@ -12,12 +12,14 @@ RUN apt-get update \
 
 WORKDIR /opt/palpate
 COPY constraints.txt pyproject.toml README.md LICENSE ./
+COPY .ci/requirements.txt .ci/
 # The CPU build of torch; the default one on Linux brings gigabytes of CUDA.
 RUN pip install --no-cache-dir --extra-index-url https://download.pytorch.org/whl/cpu "$(grep '^torch==' constraints.txt)" -c constraints.txt
+RUN pip install --no-cache-dir --no-deps --require-hashes -r .ci/requirements.txt
 COPY core core
 COPY app app
 COPY static static
-RUN pip install --no-cache-dir . -c constraints.txt
+RUN pip install --no-cache-dir --no-deps --no-build-isolation .
 
 USER palpate
 WORKDIR /srv/palpate

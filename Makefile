@@ -92,8 +92,10 @@ $(VENV)/.torch: constraints.txt | $(VENV)/.created
 	$(PIP) install --quiet "$$(grep '^torch==' constraints.txt)" -c constraints.txt
 	@touch $@
 
-$(VENV)/.installed: pyproject.toml constraints.txt $(VENV)/.torch
-	$(PIP) install --quiet -e . -c constraints.txt
+# Every file is compared with its hash; --no-build-isolation, so that Palpate is built by the setuptools among them.
+$(VENV)/.installed: pyproject.toml .ci/requirements.txt $(VENV)/.torch
+	$(PIP) install --quiet --no-deps --require-hashes -r .ci/requirements.txt
+	$(PIP) install --quiet --no-deps --no-build-isolation -e .
 	@touch $@
 
 $(VENV)/.peers: pyproject.toml constraints.txt $(VENV)/.system-bench $(VENV)/.installed
