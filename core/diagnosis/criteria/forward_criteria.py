@@ -101,7 +101,7 @@ class DerivativeCriteria:
 
 @dataclass(frozen=True, kw_only=True)
 class HistoryCriteria:
-    """Resolution of the tool's path in replays with history."""
+    """Resolution of the tool's path in replays with history, and their columns."""
 
     travel: float = threshold(
         2e-3,
@@ -134,6 +134,17 @@ class HistoryCriteria:
     )
     most_trace_scale: float = threshold(
         2.0, "1", "Largest factor that fits a trace to the full path-dependent replay."
+    )
+    replayed_columns: int = threshold(
+        3,
+        "1",
+        "Largest number of times that the columns of a model with history are replayed in a fit.",
+    )
+    replayed_again: float = threshold(
+        25.0,
+        "nat",
+        "The columns are replayed again where a fit by them gained more.",
+        "derived: less is no cause beside the model, for a further cause must gain twice as much",
     )
     most_interpolated: float = threshold(
         3.0, "1", "Largest factor on a group's state at an instant between groups."

@@ -258,11 +258,6 @@ class FitCriteria:
     poll_step: float = threshold(
         0.25, "1", "Distance to either side at which a fit with kinks is polled, in scales."
     )
-    replayed_columns: int = threshold(
-        3,
-        "1",
-        "Largest number of times that the columns of a model with history are replayed in a fit.",
-    )
     polls: int = threshold(3, "1", "Largest number of polls that restart a fit.")
     dampings: tuple[float, ...] = threshold(
         tuple(np.geomspace(1e-3, 1e12, 61).tolist()),
