@@ -20,7 +20,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export MKL_NUM_THREADS ?= 1
 export NUMBA_NUM_THREADS ?= 1
 
-.PHONY: demo test test-more bench check check-page docs names types-of-code types-of-tests clean install develop
+.PHONY: demo test test-more bench check check-page docs licences names types-of-code types-of-tests clean install develop
 .DELETE_ON_ERROR:
 
 demo: install
@@ -67,6 +67,10 @@ types-of-code:
 types-of-tests:
 	MYPYPATH=tests:. $(VENV)/bin/mypy --cache-dir .mypy_cache/tests --explicit-package-bases --allow-untyped-defs \
 	    --allow-incomplete-defs --allow-untyped-calls --no-warn-return-any --no-warn-unused-ignores tests benchmarks
+
+# The licences of all that is installed, as a table.
+licences: develop
+	@$(VENV)/bin/pip-licenses --from=mixed --order=license --format=markdown
 
 clean:
 	rm -rf $(VENV) $(PAGE)/node_modules build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
