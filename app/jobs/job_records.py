@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import threading
 import time
@@ -12,26 +13,31 @@ from pathlib import Path
 from typing import Any
 
 from palpate.app.http_errors import Missing, NoSpace, disk_is_full
+from palpate.foundation.errors import RunError
 
 __all__ = ["Job", "JobRecords", "JobState", "Note"]
 
-SCHEMA = """
-create table if not exists jobs (
+SCHEMA = (
+    """create table if not exists jobs (
     id text primary key, kind text not null, request text not null, state text not null,
     fraction real not null, text text not null, created real not null, started real,
-    finished real, error text, result text
-);
-create table if not exists log (
+    finished real, error text, result text, attempt integer not null default 1, key text,
+    seconds real not null default 0
+)""",
+    """create table if not exists log (
     job text not null, at real not null, level text not null, text text not null
-);
-create index if not exists log_of_job on log (job);
-"""
+)""",
+    "create index if not exists log_of_job on log (job)",
+)
+KEYS = "create unique index if not exists jobs_by_key on jobs (key)"
 LATER = {
     "attempt": "integer not null default 1",
     "key": "text",
     "seconds": "real not null default 0",
 }
 """Columns that files of earlier versions lack."""
+VERSION = 1
+"""Version of the file; 0 before versions were kept. Raised with every change of its tables."""
 FORESEEN = 0.03
 """Share of a job that must be done before its remaining time is estimated [1]."""
 MOST_NOTES = 5000
@@ -109,22 +115,43 @@ JSON_COLUMNS = ("request", "error", "result")
 class JobRecords:
     """The table of jobs; every method may be called from any thread.
 
-    A change raises NoSpace where the disk is full.
+    A change raises NoSpace where the disk is full. A file of an earlier version is copied beside
+    itself, as `jobs-version-0.sqlite`, before its tables are changed; RunError for one of a later
+    version.
     """
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._lock = threading.Lock()
         self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        try:
+            self._migrate(path)
+        except BaseException:
+            self._database.close()
+            raise
         self._database.execute("pragma journal_mode=wal")
         self._database.execute("pragma synchronous=normal")
-        self._database.executescript(SCHEMA)
-        there = {row[1] for row in self._database.execute("pragma table_info(jobs)")}
-        for name, kind in LATER.items():
-            if name not in there:
-                self._database.execute(f"alter table jobs add column {name} {kind}")
-        self._database.execute("create unique index if not exists jobs_by_key on jobs (key)")
         self.version = 0
+
+    def _migrate(self, path: Path) -> None:
+        """Bring the tables to the present version."""
+        (known,) = self._database.execute("pragma user_version").fetchone()
+        there = {row[1] for row in self._database.execute("pragma table_info(jobs)")}
+        if known > VERSION:
+            raise RunError(
+                f"{path} was written by a later Palpate (version {known} of the file; this one "
+                f"reads up to {VERSION}): update Palpate, or name another folder of runs",
+                file=str(path),
+                value=known,
+            )
+        if known == VERSION:
+            return
+        if there:
+            _back_up(self._database, path.with_name(f"{path.stem}-version-{known}{path.suffix}"))
+        missing = [name for name in LATER if there and name not in there]
+        added = [f"alter table jobs add column {name} {LATER[name]}" for name in missing]
+        changes = [*SCHEMA, *added, KEYS, f"pragma user_version = {VERSION}"]
+        self._database.executescript(f"begin; {'; '.join(changes)}; commit;")
 
     def add(self, job: Job) -> bool:
         """Add a record; returns False, and adds nothing, where its id or its key is taken."""
@@ -244,3 +271,15 @@ def _job(row: tuple[Any, ...]) -> Job:
         values[name] = None if values[name] is None else json.loads(values[name])
     values["state"] = JobState(values["state"])
     return Job(**values)
+
+
+def _back_up(database: sqlite3.Connection, path: Path) -> None:
+    """Copy a database to a file, which appears once it is whole."""
+    aside = path.with_name(f".{path.name}.part")
+    aside.unlink(missing_ok=True)
+    copy = sqlite3.connect(aside)
+    try:
+        database.backup(copy)
+    finally:
+        copy.close()
+    os.replace(aside, path)
