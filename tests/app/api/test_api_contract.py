@@ -4,13 +4,17 @@ that is not announced.
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator
 from typing import Any
+from urllib.parse import urlencode
 
 import httpx
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings, strategies
+from raw_requests import answered, raw
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (
     content_type_conformance,
@@ -74,6 +78,83 @@ def test_operation_keeps_to_its_description(
 
     keeps()
     assert answers and max(answers) < 500, answers
+
+
+NAMES = [
+    "small",
+    "drag-01",
+    "%00",
+    "x" * 300,
+    "%ED%A0%80",
+    "%FF",
+    "..%2f..",
+    "%0d%0a",
+    "%F0%9F%92%A9",
+]
+HEADERS = (
+    *("accept", "accept-encoding", "authorization", "connection", "content-encoding"),
+    *("content-length", "content-type", "cookie", "expect", "forwarded", "host", "idempotency-key"),
+    *("if-modified-since", "if-none-match", "origin", "range", "referer", "te", "upgrade"),
+    *("transfer-encoding", "x-forwarded-for", "x-forwarded-host", "x-http-method-override"),
+)
+VALUES = strategies.one_of(
+    strategies.sampled_from(
+        [
+            "",
+            "*/*;q=x",
+            "Basic ====",
+            "Bearer \u00ff",
+            'a=b; a="',
+            "application/json; charset=nothing",
+            "bytes=9-1,-0",
+            "for=[::1",
+            "gzip, gzip, gzip",
+            "http://[bad",
+            "multipart/form-data",
+            "multipart/form-data; boundary=",
+            "null",
+            "websocket",
+            "x" * 9000,
+        ]
+    ),
+    strategies.text(strategies.characters(min_codepoint=33, max_codepoint=255), max_size=60),
+)
+
+
+@pytest.mark.parametrize(("path", "method"), OPERATIONS, ids=str)
+def test_no_path_and_no_header_makes_a_fault_of_the_server(
+    api: tuple[Any, httpx.Client], path: str, method: str
+) -> None:
+    schema, client = api
+    answers: list[int] = []
+
+    @settings(
+        max_examples=15,
+        deadline=None,
+        database=None,
+        derandomize=True,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(
+        case=schema[path][method.upper()].as_strategy(),
+        names=strategies.lists(strategies.sampled_from(NAMES), min_size=2, max_size=2),
+        headers=strategies.dictionaries(strategies.sampled_from(HEADERS), VALUES, max_size=4),
+    )
+    def asked(case: Any, names: list[str], headers: dict[str, str]) -> None:
+        hostile = iter(names)
+        url = re.sub(r"{\w+}", lambda _: next(hostile), path)
+        values = {key: str(value) for key, value in (case.query or {}).items()}
+        query = urlencode(values, errors="replace")
+        body = json.dumps(case.body).encode() if isinstance(case.body, dict | list) else b""
+        sent = {"content-length": str(len(body)), "connection": "close", **headers}
+        lines = [f"{name}: {value}" for name, value in sent.items()]
+        answer = answered(client, raw(client, f"{method.upper()} {url}?{query}", *lines, body=body))
+        assert not answer or re.match(rb"HTTP/1.1 [1-4]", answer), (sent, answer[:200])
+        answers.append(len(answer))
+
+    asked()
+    assert max(answers) > 0
+    assert client.get("/health").status_code == 200
 
 
 def test_every_operation_says_what_it_does_and_what_may_go_wrong() -> None:

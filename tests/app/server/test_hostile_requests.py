@@ -11,6 +11,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from raw_requests import answered, raw
 from websockets.sync.client import connect
 
 from palpate.app.main import create_app
@@ -31,27 +32,6 @@ NAMES = [
 ]
 """NUL, too long for a file, half a surrogate, no UTF-8, dots, a slash, a line end, emojis."""
 ENDLESS = "/api/jobs/events"
-
-
-def answered(client: httpx.Client, request: bytes, seconds: float = 10.0) -> bytes:
-    """The head of the answer to raw bytes; empty where the server closes without one."""
-    url = client.base_url
-    with socket.create_connection((url.host, url.port or 80), timeout=seconds) as line:
-        line.sendall(request)
-        head = b""
-        while b"\r\n\r\n" not in head:
-            more = line.recv(4096)
-            if not more:
-                break
-            head += more
-    return head
-
-
-def raw(client: httpx.Client, line: str, *headers: str, body: bytes = b"") -> bytes:
-    """A request as bytes, in which nothing is made proper."""
-    host = f"host: {client.base_url.host}:{client.base_url.port}"
-    head = "\r\n".join([f"{line} HTTP/1.1", host, *headers])
-    return head.encode("latin-1") + b"\r\n\r\n" + body
 
 
 @pytest.mark.parametrize("name", NAMES)
