@@ -34,7 +34,7 @@ def test_every_package_has_hashes_and_the_version_of_the_constraints() -> None:
     for name, (version, hashes) in _locked().items():
         assert hashes, name
         if name != "setuptools":  # pip freeze leaves it out
-            assert pinned[name] == version, name
+            assert pinned[canonicalize_name(name)] == version, name
 
 
 def test_all_that_palpate_needs_is_there_but_torch() -> None:
