@@ -19,15 +19,18 @@ class Conflict(PalpateError):
     """The request does not fit the state of the thing that it names."""
 
 
-class NoSpace(PalpateError):
-    """The disk is full."""
+_FULL = (
+    "the disk of the runs folder is full: empty the caches (Jobs on the page, or POST "
+    "/api/disk/empty), delete runs, or make room; waiting jobs then go on, "
+    "and failed ones can be retried"
+)
 
-    def __init__(self) -> None:
-        super().__init__(
-            "the disk of the runs folder is full: empty the caches (Jobs on the page, or POST "
-            "/api/disk/empty), delete runs, or make room; waiting jobs then go on, "
-            "and failed ones can be retried"
-        )
+
+class NoSpace(PalpateError):
+    """The disk is full, or the results take more than they may."""
+
+    def __init__(self, message: str = _FULL) -> None:
+        super().__init__(message)
 
 
 def disk_is_full(error: BaseException) -> bool:

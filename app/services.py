@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Header
 from starlette.requests import HTTPConnection
 
+from palpate.app.http_errors import NoSpace
 from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
 from palpate.app.jobs.whatif_process import FrameSolver, InteractiveSolver
@@ -24,6 +25,7 @@ from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.disk_usage import Disk
 from palpate.app.storage.registration_store import RegistrationStore
 from palpate.app.storage.run_store import RunStore
+from palpate.app.storage.stored_results import StoredResults
 
 __all__ = ["CurrentServices", "IdempotencyKey", "Services"]
 
@@ -64,6 +66,7 @@ class Services:
                 settings.preload,
                 [settings.datasets / STAGING],
                 lambda: _tidy(disk),
+                lambda: _admit(disk, settings.runs),
                 failed,
             ),
             disk=disk,
@@ -133,10 +136,24 @@ def _tidy(disk: Disk) -> str:
     say.
     """
     now = disk.trim()
-    if now.used > now.limit:
-        used, limit = now.used / 2**30, now.limit / 2**30
-        return f"the results take {used:.1f} GiB of {limit:.1f} GiB: delete some of them"
     return f"dropped {now.dropped / 2**20:.0f} MiB of the oldest caches" if now.dropped else ""
+
+
+def _admit(disk: Disk, runs: Path) -> None:
+    """Raise NoSpace where the results alone take more than the limit, and name the largest."""
+    now = disk.usage()
+    if now.used - now.caches <= now.limit:
+        return
+    largest = [
+        f"{one.kind} {one.name} ({one.bytes / 2**30:.2f} GiB)"
+        for one in StoredResults(runs).largest(3)
+    ]
+    raise NoSpace(
+        f"the results take {(now.used - now.caches) / 2**30:.2f} GiB of the "
+        f"{now.limit / 2**30:.2f} GiB that they may: delete what is no longer needed (Jobs on the "
+        f"page, or DELETE /api/disk/KIND/NAME), first of all {', '.join(largest)}; or start the "
+        "server with a larger --disk-limit"
+    )
 
 
 def _services(connection: HTTPConnection) -> Services:

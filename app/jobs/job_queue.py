@@ -46,6 +46,7 @@ class JobQueue:
         beside: folders in which a job may hold another scratch folder of its id; other servers
             may use them, too.
         tidy: is called before each job; its text goes into the job's log.
+        admit: is called before a job is queued; it raises to refuse the job.
         failed: is called with the reason when the queue cannot go on.
     """
 
@@ -56,6 +57,7 @@ class JobQueue:
         preload: Iterable[str] = (),
         beside: Iterable[Path] = (),
         tidy: Callable[[], str] = str,
+        admit: Callable[[], object] = lambda: None,
         failed: Callable[[str], object] = log.critical,
     ) -> None:
         beside = tuple(beside)
@@ -70,6 +72,7 @@ class JobQueue:
         for job in self._records.waiting():
             self._waiting.put(job.id)
         self._runner = JobRunner(self._records, targets, preload, beside, tidy)
+        self._admit = admit
         self._failed, self._stopped, self._put_back = failed, "", set[str]()
         self._thread = threading.Thread(target=self._serve, name="jobs", daemon=True)
         self._thread.start()
@@ -90,8 +93,9 @@ class JobQueue:
         """Queue a job; its id is the label, the time and eight random characters.
 
         A second request with the same `key` gives the same job; raises Conflict if its content
-        differs.
+        differs, and NoSpace where the results take more than they may.
         """
+        self._admit()
         while True:
             identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
             job = Job(

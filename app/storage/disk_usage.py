@@ -13,7 +13,7 @@ from palpate.app.storage.dataset_import import UPLOADS
 from palpate.app.storage.sweep_store import REPLAY_CACHE, SWEEPS
 from palpate.app.storage.training_store import SAMPLE_CACHE, TRAININGS
 
-__all__ = ["CACHES", "Disk", "Usage"]
+__all__ = ["CACHES", "Disk", "Usage", "size_of"]
 
 CACHES = (f"{SWEEPS}/{REPLAY_CACHE}", f"{TRAININGS}/{SAMPLE_CACHE}", UPLOADS)
 """Folders below the runs whose content can be computed, or uploaded, again."""
@@ -44,11 +44,7 @@ class Disk:
 
     def usage(self) -> Usage:
         """Measure the current usage."""
-        return Usage(
-            sum(size for _, size, _ in _files(self._runs)),
-            sum(size for _, size, _ in self._cached()),
-            self._limit,
-        )
+        return Usage(size_of(self._runs), sum(size for _, size, _ in self._cached()), self._limit)
 
     def trim(self, limit: int | None = None, spared: frozenset[str] = frozenset()) -> Usage:
         """Delete the least recently used files of caches until the usage is below the limit.
@@ -71,6 +67,11 @@ class Disk:
 
     def _cached(self) -> list[tuple[Path, int, float]]:
         return [file for folder in CACHES for file in _files(self._runs / folder)]
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of all files below a folder."""
+    return sum(size for _, size, _ in _files(folder))
 
 
 def _files(folder: Path) -> list[tuple[Path, int, float]]:

@@ -34,6 +34,15 @@ class ResultStore:
         """Names of all results that have begun, the newest first."""
         return [path.parent.name for path in self._newest_first(f"*/{self.first}")]
 
+    def created(self) -> dict[str, float]:
+        """Times of the last change of the first file [s since 1970] of all results, by name."""
+        paths = self._newest_first(f"*/{self.first}")
+        return {path.parent.name: path.stat().st_mtime for path in paths}
+
+    def folders(self, name: str) -> list[Path]:
+        """Folders of which a result consists."""
+        return [self.folder / name]
+
     def finished(self) -> list[str]:
         """Names of the finished results whose files can be read, the newest first."""
         return [name for name in self.names() if self._is_readable(name)]

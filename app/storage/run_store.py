@@ -177,6 +177,10 @@ class RunStore(ResultStore):
     def __init__(self, folder: Path) -> None:
         super().__init__(folder, "run", "report.json", "report.json")
 
+    def folders(self, name: str) -> list[Path]:
+        """Folders of a run: its own, and that of its corrected frames."""
+        return [self.folder / name, self.folder / CORRECTIONS / name]
+
     def all(self) -> list[Run]:
         """All complete runs, the newest first."""
         return [Run(self.folder / name) for name in self.names()]

@@ -1,6 +1,6 @@
 // Jobs: the newest few in the sidebar, all of them with log and retry in a panel.
 import { get, post, toast } from "./api.js";
-import { diskUsageLine } from "./disk-usage.js";
+import { diskUsage } from "./disk-usage.js";
 import { byId, element, fill, icon } from "./dom.js";
 import { capitalise, formatDuration, formatDateTime } from "./format.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
@@ -35,6 +35,23 @@ let panel;
  */
 export const onJobsDone = (listener) => listeners.push(listener);
 
+/** @type {((kind: string, name: string) => unknown)[]} */
+const deletionListeners = [];
+
+/**
+ * Call the listener with the kind and the name of each result that is deleted on this page.
+ * @param {(kind: string, name: string) => unknown} listener
+ */
+export const onResultDeleted = (listener) => deletionListeners.push(listener);
+
+/**
+ * @param {string} kind
+ * @param {string} name
+ */
+function tellDeleted(kind, name) {
+  for (const listener of deletionListeners) listener(kind, name);
+}
+
 /**
  * Offer a button for jobs whose result has a key.
  * @param {string} key
@@ -56,7 +73,7 @@ export function startJobs() {
     const done = jobs.filter(
       ({ id, state }) => state === "done" && before.has(id) && before.get(id) !== "done",
     );
-    if (done.length && panel.firstChild) byId("disk").replaceWith(diskUsageLine());
+    if (done.length && panel.firstChild) byId("disk").replaceWith(diskUsage(tellDeleted));
     if (done.length) for (const listener of listeners) listener(done);
   };
   events.addEventListener("trouble", ({ data }) => showTrouble(JSON.parse(data)));
@@ -97,7 +114,7 @@ function drawPanel() {
       element("div", { class: "eyebrow" }, "Jobs"),
       element("h1", { class: "verdict" }, "What was asked for, and what became of it"),
       element("div", { class: "jobs-list" }),
-      diskUsageLine(),
+      diskUsage(tellDeleted),
       element(
         "p",
         { class: "disk muted" },

@@ -4,7 +4,7 @@ import { openImportDialog, importDroppedFiles } from "./import-dialog.js";
 import { showDataset } from "./dataset-panel.js";
 import { byId, element, fill } from "./dom.js";
 import { formatMm, formatDateTime, readableName } from "./format.js";
-import { onJobsDone, addResultOpener, startJobs } from "./jobs.js";
+import { onJobsDone, onResultDeleted, addResultOpener, startJobs } from "./jobs.js";
 import { openedPanel } from "./panels.js";
 import { openRegistration } from "./register.js";
 import { subscribe, set, state } from "./store.js";
@@ -40,6 +40,13 @@ export async function start(open) {
     // Opened only while the report is in front, so that nobody is taken away from another panel.
     const finished = done.find(({ id }) => id === requestedDiagnosis);
     if (finished && openedPanel() === "report") openRun(finished.id);
+  });
+  onResultDeleted(async (kind, name) => {
+    if (kind !== "run") return;
+    await refreshRuns();
+    if (name !== state().run) return;
+    if (runs.length) openRun(runs[0].id);
+    else location.reload();
   });
   addResultOpener("registration", "See the registration", (_, __, { dataset }) =>
     openRegistration(dataset),

@@ -315,6 +315,15 @@ export interface DiskUsage {
   used: number;
   caches: number;
   limit: number;
+  largest: StoredResult[];
+}
+
+/** A result that takes room; its time in s since 1970. */
+export interface StoredResult {
+  kind: string;
+  name: string;
+  bytes: number;
+  created: number;
 }
 
 /** A parameter in the catalogue of effects. */
