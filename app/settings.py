@@ -32,7 +32,8 @@ class Settings(BaseSettings):
         largest_body: bytes of a request.
         largest_upload: bytes of an uploaded archive.
         largest_dataset: bytes of an unpacked dataset.
-        disk_limit: bytes of the runs folder beyond which the oldest caches are deleted.
+        disk_limit: bytes of the runs folder beyond which the oldest caches are deleted, and new
+            jobs refused where the results alone take more.
     """
 
     model_config = SettingsConfigDict(env_prefix="PALPATE_", frozen=True)

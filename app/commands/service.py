@@ -34,7 +34,12 @@ def serve(
         ),
     ] = None,
     disk_limit: Annotated[
-        float, typer.Option(min=0.1, help="GiB of RUNS beyond which the oldest caches are deleted.")
+        float,
+        typer.Option(
+            min=0.1,
+            help="GiB of RUNS beyond which the oldest caches are deleted, and new jobs refused "
+            "where the results alone take more.",
+        ),
     ] = 20.0,
     new_token: Annotated[
         bool, typer.Option("--new-token", help="Make a new token; the old one becomes invalid.")

@@ -138,10 +138,10 @@ function drawRuns() {
                 "span",
                 { class: "sub" },
                 [
+                  changed ? "⚠ data changed" : "",
                   verdict === "replay" ? "replay" : "",
                   folder ?? dataset,
                   formatDateTime(created),
-                  changed ? "data changed since" : "",
                 ]
                   .filter(Boolean)
                   .join(" · "),
