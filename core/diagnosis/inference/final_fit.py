@@ -17,7 +17,7 @@ from palpate.effects import Effect, Tangent
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.setup import Inclusion
 
-__all__ = ["refine", "settle"]
+__all__ = ["refine", "settle", "with_columns_of"]
 
 
 def refine(evaluator: Evaluator, model: Model) -> Model:
@@ -122,9 +122,24 @@ class _HeldColumns(Evaluator):
     ) -> Model:
         """Replay the effects; arguments as for `Evaluator.evaluate`."""
         model = self._told.evaluate(effects, starts, tangents, inclusions)
-        rows = zip(model.predictions, self._model.predictions, strict=True)
-        found = [_with_columns(here, there, self._held) for here, there in rows]
-        return self.assemble(effects, model.setup, found, tangents, len(inclusions))
+        return with_columns_of(self, model, self._model, self._held, len(inclusions))
+
+
+def with_columns_of(
+    evaluator: Evaluator, model: Model, other: Model, places: Sequence[int], inclusions: int = 0
+) -> Model:
+    """Return a model with some columns of another model of the same effects.
+
+    Args:
+        evaluator: of the inference problem.
+        model: whose columns are replaced.
+        other: whose columns are taken.
+        places: of the columns.
+        inclusions: number of places of inclusions among the columns of `model`.
+    """
+    rows = zip(model.predictions, other.predictions, strict=True)
+    found = [_with_columns(here, there, list(places)) for here, there in rows]
+    return evaluator.assemble(model.effects, model.setup, found, model.tangents, inclusions)
 
 
 def _with_columns(here: Prediction, there: Prediction, places: list[int]) -> Prediction:

@@ -18,7 +18,7 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.evaluate_history import plain_model
 from palpate.diagnosis.inference.evidence import predictive_gain
-from palpate.diagnosis.inference.final_fit import settle
+from palpate.diagnosis.inference.final_fit import settle, with_columns_of
 from palpate.diagnosis.inference.gauss_newton import refit, worth_while
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.search.candidates import candidates_of, tangents_of
@@ -73,6 +73,8 @@ def screen_again(
     tangents = tangents_of(problem.applicable, model.setup, model.names)
     places = inclusion_places(problem)
     extended = evaluator.evaluate(model.effects, model.predictions, tangents, places)
+    if model.has_history:  # beside its replayed columns, those of another cause promise less
+        extended = with_columns_of(evaluator, extended, model, model.columns, len(places))
     updated = updated_signatures(evaluator, extended, signatures, origin)
     return screen(evaluator, extended, updated, origin)
 
