@@ -123,9 +123,10 @@ def _next_cause(
     """Return the best further cause that gains more than the bound, by all sequences; or None."""
     screened, candidates, gains = screening
     trials = list[Trial]()
-    asked = [required_gain(findings, current, one.start.name, True) for one in candidates]
-    least = CRITERIA.naming.promising * np.array(asked)
-    more = _refits_nonlinear(findings, current, gains > least)
+    names, share = [one.start.name for one in candidates], CRITERIA.naming.promising
+    lowest = [share * required_gain(findings, current, name, True) for name in names]
+    least = share * np.array([_enough(findings, current, name) for name in names])
+    more = _refits_nonlinear(findings, current, gains > np.array(lowest))
     settled = beyond_first_order(evaluator, screened, candidates) if more else []
     chosen = shortlist(gains, candidates, least, settled)
     before = evaluator.objective(current.model)
@@ -161,6 +162,24 @@ def _next_cause(
         ]
     findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
     return best
+
+
+def _enough(findings: Findings, current: Trial, name: str) -> float:
+    """Return the least gain [nats] with which an effect can be named as the next cause.
+
+    Without history the first lower bound will do, as trials are cheap there. Beside history a trial
+    takes minutes, and it must gain the whole that `required_gain` asks for, or at least what
+    removes enough of the misfit above noise.
+    """
+    least = required_gain(findings, current, name, True)
+    if not current.model.has_history:
+        return least
+    whole = required_gain(findings, current, name)
+    if current.misfit <= 1.0:
+        return whole
+    values = sum(block.values for block in current.model.blocks if block.name != "rest")
+    rest = (1.0 - CRITERIA.naming.second_left) * (current.misfit - 1.0) * values / 2.0
+    return min(whole, max(least, rest))
 
 
 def _with_required_gains(

@@ -5,16 +5,19 @@ import pytest
 from pushed_block import SETUP
 
 from palpate.diagnosis.criteria import CRITERIA
+from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.forward_selection import (
+    _enough,
     _refits_nonlinear,
     removes_rest,
     required_gain,
 )
 from palpate.effects.support import BaseCompliance
+from palpate.effects.time_dependence import Viscoelasticity
 
 STATED = Model((), SETUP, (), (), ModelColumns(()))
 SOFT = Model((BaseCompliance(stiffness_over_E=41.0),), SETUP, (), (), ModelColumns(()))
@@ -62,6 +65,27 @@ def test_faint_second_cause_that_removes_the_rest_is_let_in():
         for trial in (whole, half)
     ]
     assert asked[0] == 2 * CRITERIA.naming.least_gain < 400.0 < asked[1]
+
+
+def test_beside_history_a_cause_must_promise_what_can_name_it():
+    """A gel of 7797 nats whose misfit of 1.023 is of another law: 60 nats name nothing there."""
+    history = Model(
+        (Viscoelasticity(relaxed_fraction=0.7, time_constant=1.1),),
+        SETUP,
+        (),
+        (Block("poke", np.eye(1), 25_000.0), Block("rest", np.eye(1), 900.0)),
+        ModelColumns(()),
+    )
+    findings, gel = Findings(STATED, remaining=QUIET), Trial(history, 7797.0, 1.023)
+    lowest = required_gain(findings, gel, "permanent_set", True)
+    asked = _enough(findings, gel, "permanent_set")
+    assert asked == pytest.approx(0.5 * 0.023 * 25_000 / 2) and lowest < 60.0 < asked
+    assert removes_rest(gel, Trial(history, 7797.0 + asked, 1.023 - 2 * asked / 25_000))
+    loud, clean = Findings(STATED, remaining=LOUD), Trial(history, 7797.0, 0.99)
+    assert _enough(loud, gel, "permanent_set") == lowest
+    assert _enough(findings, clean, "permanent_set") == required_gain(findings, clean, "gravity")
+    soft = Trial(SOFT, 7797.0, 1.023)  # trials without history are cheap
+    assert _enough(findings, soft, "permanent_set") == lowest
 
 
 def test_nonlinear_effects_are_refitted_beside_a_cause_only_where_another_might_be_named():
