@@ -22,7 +22,7 @@ from palpate.app.cli import app
 from palpate.app.settings import Settings
 
 KINDS = ("datasets", "runs", "sweeps", "trainings", "evaluations", "jobs", "diagnoses", "exports")
-AS_WRITTEN = ("/report", "/model", "/points", "/registrations/by-hand")
+AS_WRITTEN = ("/report", "/model", "/registrations/by-hand")
 OLD_NAMES = {"core", "app"}
 FINISHED = {"done", "failed", "cancelled", "interrupted"}
 
@@ -58,6 +58,8 @@ def test_every_stored_item_is_answered_as_before(
             assert answer.json() == expected["answer"], path
         elif "json" in answer.headers["content-type"]:
             tolerance = TOLERANCE if path.endswith("/whatif") else 0.0
+            if path.endswith("/points"):
+                assert answer.json()["points"] == expected["answer"]["points"], path
             body, more = expected["answer"], {"tolerance": tolerance, "until": home.killed}
             found += differences(body, answer.json(), path, **more)
         elif hashlib.sha256(answer.content).hexdigest() != expected["answer"]["sha256"]:
