@@ -18,7 +18,6 @@ from palpate.app.reporting.timeline_series import timeline_series
 from palpate.app.scene.model_layer import NO_INSIDE
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices
-from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.foundation.errors import RunError
 
@@ -34,7 +33,7 @@ def listed(
     """Runs, the newest first, each with its verdict, or `unreadable`. The header X-Total-Count has
     their number.
     """
-    return [_listed(run, services.library) for run in paginate(services.runs.all(), page, response)]
+    return [_listed(run) for run in paginate(services.runs.all(), page, response)]
 
 
 @router.get("/{name}")
@@ -46,7 +45,7 @@ def one(name: str, services: CurrentServices) -> dict[str, Any]:
     replays = [run.replay(sequence) for sequence in run.sequences]
     size = [round(float(edge), 6) for edge in replays[0].size] if replays else None
     return {
-        **_heading(run, services.library),
+        **_heading(run),
         "sentence": verdict_sentence(run.report, size),
         "notes": registration_sentences(run.report),
         "size": size,
@@ -171,9 +170,9 @@ def _worst(replay: RecordedReplay) -> dict[str, Any]:
     return {key: finite(replay[key][frame]) for key in keys}
 
 
-def _listed(run: Run, library: Library) -> dict[str, Any]:
+def _listed(run: Run) -> dict[str, Any]:
     try:
-        return _heading(run, library)
+        return _heading(run)
     except (RunError, AttributeError, KeyError, TypeError):  # damaged, or of another program
         return {
             "id": run.name,
@@ -186,14 +185,18 @@ def _listed(run: Run, library: Library) -> dict[str, Any]:
         }
 
 
-def _heading(run: Run, library: Library) -> dict[str, Any]:
-    report, folder = run.report, Path(run.origin.get("dataset", "")).name
+def _heading(run: Run) -> dict[str, Any]:
+    from palpate.dataset.provenance import data_changed
+
+    report, dataset = run.report, run.origin.get("dataset")
     return {
         "id": run.name,
         "dataset": report.get("dataset", "?"),
-        "folder": folder or None,
+        "folder": Path(dataset).name if dataset else None,
         "verdict": report.get("verdict", "?"),
         "causes": [cause["effect"] for cause in report.get("causes", [])],
         "created": run.origin.get("created", run.path.stat().st_mtime),
-        "data_changed": library.data_changed(folder, run.origin.get("made_from", {})),
+        "data_changed": data_changed(Path(dataset), run.origin.get("made_from", {}))
+        if dataset
+        else None,
     }

@@ -95,7 +95,8 @@ class JobQueue:
         A second request with the same `key` gives the same job; raises Conflict if its content
         differs, and NoSpace where the results take more than they may.
         """
-        self._admit()
+        if key is None or self._records.by_key(key) is None:
+            self._admit()
         while True:
             identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
             job = Job(

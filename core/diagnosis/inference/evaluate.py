@@ -30,7 +30,7 @@ from palpate.foundation.progress import Report, silent
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Inclusion, Setup
 
-__all__ = ["Evaluator"]
+__all__ = ["Evaluator", "SharedEvaluator"]
 
 
 class Evaluator(Posterior):
@@ -256,3 +256,20 @@ class Evaluator(Posterior):
         blocks += self._at_rest(model, last, varied)
         layout = replace(model.layout, nuisances=(*model.nuisance[:-1], last), signatures=places)
         return replace(model, blocks=tuple(blocks), layout=layout)
+
+
+class SharedEvaluator(Evaluator):
+    """Evaluates in another way for the same search: it shares the state of the evaluator that it is
+    made from, and reports as that one does.
+
+    Args:
+        evaluator: of the inference problem.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        super().__init__(evaluator.problem, evaluator.workers)
+        self.state, self._told = evaluator.state, evaluator
+
+    def report(self, text: str, done: float = 0.0) -> None:
+        """Report as the evaluator that it is made from does."""
+        self._told.report(text, done)

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.evaluate import Evaluator, SharedEvaluator
 from palpate.diagnosis.inference.evaluate_history import with_replayed_columns
 from palpate.diagnosis.inference.gauss_newton import best_fit
 from palpate.diagnosis.inference.hypothesis import Model
@@ -88,10 +88,8 @@ def _with_replayed_columns(evaluator: Evaluator, model: Model, chosen: Sequence[
     return evaluator.assemble(model.effects, model.setup, found)
 
 
-class _HeldColumns(Evaluator):
+class _HeldColumns(SharedEvaluator):
     """Evaluates models near one whose columns of effects are held.
-
-    It shares the state of the evaluator that it is made from.
 
     Args:
         evaluator: of the inference problem.
@@ -100,18 +98,14 @@ class _HeldColumns(Evaluator):
     """
 
     def __init__(self, evaluator: Evaluator, model: Model, chosen: Sequence[bool]) -> None:
-        super().__init__(evaluator.problem, evaluator.workers)
-        self.state, self._told, self._model = evaluator.state, evaluator, model
+        super().__init__(evaluator)
+        self._model = model
         counts = [len(effect.numbers()) for effect in model.effects]
         self._held = [
             column
             for column, held in zip(model.columns, np.repeat(chosen, counts), strict=True)
             if held
         ]
-
-    def report(self, text: str, done: float = 0.0) -> None:
-        """Report as the evaluator that it is made from does."""
-        self._told.report(text, done)
 
     def evaluate(
         self,

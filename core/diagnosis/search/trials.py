@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
-from palpate.diagnosis.inference.evaluate import Evaluator
+from palpate.diagnosis.inference.evaluate import Evaluator, SharedEvaluator
 from palpate.diagnosis.inference.evaluate_history import plain_model
 from palpate.diagnosis.inference.evidence import predictive_gain
 from palpate.diagnosis.inference.final_fit import settle, with_columns_of
@@ -134,11 +134,10 @@ def settled_trials(
     return found
 
 
-class HeldHistory(Evaluator):
+class HeldHistory(SharedEvaluator):
     """Evaluates further causes beside a model with history, whose change by the history is held.
 
-    To first order its numbers may still change. It shares the state of the evaluator that it is
-    made from.
+    To first order its numbers may still change.
 
     Args:
         evaluator: of the inference problem.
@@ -149,13 +148,9 @@ class HeldHistory(Evaluator):
     """
 
     def __init__(self, evaluator: Evaluator, beside: Model) -> None:
-        super().__init__(evaluator.problem, evaluator.workers)
-        self.state, self._told, self._beside = evaluator.state, evaluator, beside
+        super().__init__(evaluator)
+        self._beside = beside
         self.plain = plain_model(evaluator, beside.effects, beside.predictions)
-
-    def report(self, text: str, done: float = 0.0) -> None:
-        """Report as the evaluator that it is made from does."""
-        self._told.report(text, done)
 
     def evaluate(
         self,

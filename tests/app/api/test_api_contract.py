@@ -30,6 +30,9 @@ DESCRIBED = create_app(Settings(), {}).openapi()["paths"]
 OPERATIONS = [
     (path, method) for path, methods in DESCRIBED.items() for method in methods if path != ENDLESS
 ]
+REPEATABLE = settings(
+    deadline=None, database=None, derandomize=True, suppress_health_check=list(HealthCheck)
+)
 CHECKS = [
     not_a_server_error,
     status_code_conformance,
@@ -61,13 +64,7 @@ def test_operation_keeps_to_its_description(
     }
     answers: list[int] = []
 
-    @settings(
-        max_examples=30,
-        deadline=None,
-        database=None,
-        derandomize=True,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(REPEATABLE, max_examples=30)
     @given(case=schema[path][method.upper()].as_strategy(), real=strategies.booleans())
     def keeps(case: Any, real: bool) -> None:
         if real:  # a name that nothing has leads nowhere
@@ -128,13 +125,7 @@ def test_no_path_and_no_header_makes_a_fault_of_the_server(
     schema, client = api
     answers: list[int] = []
 
-    @settings(
-        max_examples=15,
-        deadline=None,
-        database=None,
-        derandomize=True,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(REPEATABLE, max_examples=15)
     @given(
         case=schema[path][method.upper()].as_strategy(),
         names=strategies.lists(strategies.sampled_from(NAMES), min_size=2, max_size=2),

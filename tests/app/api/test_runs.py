@@ -1,9 +1,15 @@
 from __future__ import annotations
 
+import json
+import shutil
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from small_dataset import write_valid_dataset
+
+from palpate.dataset.provenance import made_from
 
 
 @pytest.fixture
@@ -77,3 +83,22 @@ def test_broken_run_is_409_and_does_not_hide_the_others(
     assert client.get("/api/runs/torn").status_code == 409
     verdicts = {run["id"]: run["verdict"] for run in client.get("/api/runs").json()}
     assert verdicts == {"torn": "unreadable", base.rsplit("/", 1)[1]: "found"}
+
+
+def test_run_tells_that_its_data_have_changed_since(
+    client: httpx.Client, shared_place: Any, base: str, tmp_path: Path
+) -> None:
+    """The dataset is that of the run's origin, wherever it lies."""
+    folder = write_valid_dataset(tmp_path / "elsewhere")
+    run = shared_place.runs / "measured"
+    shutil.copytree(shared_place.runs / base.rsplit("/", 1)[1], run)
+    file = run / "origin.json"
+    origin = {**json.loads(file.read_text()), "dataset": str(folder)}
+    file.write_text(json.dumps(origin))
+    assert client.get("/api/runs/measured").json()["data_changed"] is None
+    file.write_text(json.dumps({**origin, "made_from": made_from(folder)}))
+    assert client.get("/api/runs/measured").json()["data_changed"] is False
+    (folder / "touches.csv").write_text((folder / "touches.csv").read_text() + "\n")
+    listed = {one["id"]: one["data_changed"] for one in client.get("/api/runs").json()}
+    assert listed["measured"] is True
+    shutil.rmtree(run)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from job_functions import TARGETS, alive, ended, reached, scratch_is_clean
 
-from palpate.app.http_errors import Conflict, Missing
+from palpate.app.http_errors import Conflict, Missing, NoSpace
 from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import JobState
 
@@ -177,3 +177,23 @@ def test_clock_that_is_set_back_changes_no_duration(
     later = jobs.submit("count", {"steps": 1, "result": str(tmp_path / "later")})
     assert [one.id for one in jobs.all()] == [later.id, job.id]
     ended(jobs, later)
+
+
+def test_request_that_is_repeated_is_the_known_job_also_where_new_ones_are_refused(
+    tmp_path: Path, folder: Path
+) -> None:
+    refused = False
+
+    def admit() -> None:
+        if refused:
+            raise NoSpace("the results take more than they may")
+
+    asked = {"steps": 1, "result": str(tmp_path / "result")}
+    with closing(JobQueue(folder, TARGETS, admit=admit)) as jobs:
+        first = jobs.submit("count", asked, key="once")
+        refused = True
+        assert jobs.submit("count", asked, key="once").id == first.id
+        for key in (None, "another"):
+            with pytest.raises(NoSpace):
+                jobs.submit("count", asked, key=key)
+        assert len(jobs.all()) == 1
