@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pathlib
 import signal
@@ -128,8 +129,9 @@ def family(pid: int) -> list[int]:
     """Ids of all descendants of a process."""
     found: list[int] = []
     for task in pathlib.Path(f"/proc/{pid}/task").glob("*/children"):
-        for child in map(int, task.read_text().split()):
-            found += [child, *family(child)]
+        with contextlib.suppress(OSError):  # a thread that has ended meanwhile
+            for child in map(int, task.read_text().split()):
+                found += [child, *family(child)]
     return found
 
 

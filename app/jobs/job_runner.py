@@ -28,8 +28,9 @@ PAUSE = 0.1
 """Least time between two entries of a job's progress [s]; limits writes to the disk."""
 ENDING = 10.0
 """Longest time that the processes of an ended job may take to end [s]."""
-_STARTS = 3
-"""How often a job's process is started where the fork server ends meanwhile."""
+_PAUSES = (0.2, 1.0, 5.0)
+"""Times before a job's process is started again, where the fork server has ended [s]: until the
+system has cleared a server that was killed, it counts as running and refuses connections."""
 _NUMBERS = re.compile(r"\d+(\.\d+)?")
 
 
@@ -130,16 +131,18 @@ class JobRunner:
         A fork server that has ended is started again. Raises RunError where that does not help.
         """
         reason: Exception | None = None
-        for _ in range(_STARTS):
+        for pause in (0.0, *_PAUSES):
+            if reason is not None:
+                text = f"its process did not start ({type(reason).__name__}); started again"
+                log.warning("%s: %s", job.id, text)
+                self.patience.write(self._records.note, job.id, "warning", text)
+                self.patience.closing.wait(pause)
             try:
                 return self._process(job)
             except (EOFError, OSError) as error:
                 reason = error
-                text = f"its process did not start ({type(error).__name__}); started again"
-                log.warning("%s: %s", job.id, text)
-                self.patience.write(self._records.note, job.id, "warning", text)
         raise RunError(
-            f"no process could be started for {job.id} in {_STARTS} attempts "
+            f"no process could be started for {job.id} in {1 + len(_PAUSES)} attempts "
             f"({type(reason).__name__}: {reason}); it waits for the next start of the server",
             job=job.id,
         ) from reason

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import resource
 import signal
+import socket
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -45,6 +46,21 @@ def test_fork_server_that_is_killed_while_a_job_starts(jobs: JobQueue, tmp_path:
     for name in (first, second):
         assert ended(jobs, jobs.get(name)).state is JobState.DONE
     assert any("started again" in note.text for note in jobs.notes(first))
+
+
+def test_fork_server_that_still_dies_is_given_time(jobs: JobQueue, tmp_path: Path) -> None:
+    """A killed process refuses connections for a while before it counts as ended."""
+    fork_server()
+    server = vars(forkserver)["_forkserver"]
+    address = server._forkserver_address
+    with socket.socket(socket.AF_UNIX) as closed:
+        closed.bind(str(tmp_path / "closed"))
+    server._forkserver_address = str(tmp_path / "closed")
+    job = count(jobs, tmp_path, "one")
+    reached(jobs, jobs.get(job), lambda _: len(jobs.notes(job)) >= 2)
+    server._forkserver_address = address
+    assert ended(jobs, jobs.get(job)).state is JobState.DONE
+    assert any("ConnectionRefusedError" in note.text for note in jobs.notes(job))
 
 
 def test_full_disk_refuses_new_work_and_loses_none(jobs: JobQueue, tmp_path: Path) -> None:
@@ -109,7 +125,7 @@ def test_queue_that_cannot_start_processes_gives_up_aloud(tmp_path: Path) -> Non
                 time.sleep(0.02)
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, usual)
-        assert len(told) == 1 and "in 3 attempts (OSError" in told[0]
+        assert len(told) == 1 and "in 4 attempts (OSError" in told[0]
         assert told[0].endswith(jobs.trouble)
         assert jobs.get(job).state is JobState.QUEUED
     with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
