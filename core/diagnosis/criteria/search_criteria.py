@@ -69,16 +69,16 @@ class NamingCriteria:
     second_share: float = threshold(
         0.1,
         "1",
-        "A second cause must gain this share of the first one's gain, unless significant structure "
-        "is left or it removes most of what the first leaves.",
+        "A second cause must gain this share of the first one's gain, unless it removes most of "
+        "what the first leaves.",
         "measured: on top of the only cause, of 84 to 14 780 nats, the best of the catalogue gains "
         "at most 40",
     )
     second_left: float = threshold(
         0.5,
         "1",
-        "Largest share of the first cause's misfit above noise that a second one leaves if it "
-        "counts as removing most of it.",
+        "Largest share of the first cause's misfit above noise, or of its significant structure "
+        "beyond chance, that a second one leaves if it counts as removing most of it.",
         "measured: of 20 pairs of the virtual bench (seed 1400) whose first cause leaves misfit "
         "above noise, the second one leaves more in one",
     )

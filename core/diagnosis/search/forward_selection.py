@@ -23,6 +23,13 @@ from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.diagnosis.search.initial_guess import initial_guess
+from palpate.diagnosis.search.required_gain import (
+    gain_to_try,
+    known_names,
+    removes_misfit,
+    removes_structure,
+    required_gain,
+)
 from palpate.diagnosis.search.revision import distinct, reconsidered, try_pairs
 from palpate.diagnosis.search.screening import Candidate
 from palpate.diagnosis.search.shortlist import beyond_first_order, shortlist
@@ -37,7 +44,7 @@ from palpate.diagnosis.search.trials import (
 )
 from palpate.effects.base import with_effects
 
-__all__ = ["removes_rest", "required_gain", "search"]
+__all__ = ["search"]
 
 
 def search(evaluator: Evaluator, seed: int) -> Findings:
@@ -76,7 +83,7 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
         )
         if order:
             screening = screen_again(evaluator, current.model, signatures, origin)
-        step = _next_cause(evaluator, findings, current, screening)
+        step = _next_cause(evaluator, findings, current, screening, seed)
         if step is None:
             break
         current = findings.best = step
@@ -118,14 +125,17 @@ def _state_limits(
 
 
 def _next_cause(
-    evaluator: Evaluator, findings: Findings, current: Trial, screening: Screening
+    evaluator: Evaluator, findings: Findings, current: Trial, screening: Screening, seed: int
 ) -> Trial | None:
-    """Return the best further cause that gains more than the bound, by all sequences; or None."""
+    """Return the best further cause that gains more than the bound, by all sequences; or None.
+
+    `seed` is that of the draws for the structure that a model leaves.
+    """
     screened, candidates, gains = screening
     trials = list[Trial]()
     names, share = [one.start.name for one in candidates], CRITERIA.naming.promising
     lowest = [share * required_gain(findings, current, name, True) for name in names]
-    least = share * np.array([_enough(findings, current, name) for name in names])
+    least = share * np.array([gain_to_try(findings, current, name) for name in names])
     more = _refits_nonlinear(findings, current, gains > np.array(lowest))
     settled = beyond_first_order(evaluator, screened, candidates) if more else []
     chosen = shortlist(gains, candidates, least, settled)
@@ -146,7 +156,7 @@ def _next_cause(
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
         starts = current.model.predictions
         trials.append(trial_of(evaluator, effects, starts, current.model, hopeless, current.model))
-    trials = _with_required_gains(evaluator, findings, current, trials)
+    trials = _with_required_gains(evaluator, findings, current, trials, seed)
     enough = [trial for trial in trials if trial.gain > trial.required_gain - current.required_gain]
     best = next(
         (
@@ -164,26 +174,8 @@ def _next_cause(
     return best
 
 
-def _enough(findings: Findings, current: Trial, name: str) -> float:
-    """Return the least gain [nats] with which an effect can be named as the next cause.
-
-    Without history the first lower bound will do, as trials are cheap there. Beside history a trial
-    takes minutes, and it must gain the whole that `required_gain` asks for, or at least what
-    removes enough of the misfit above noise.
-    """
-    least = required_gain(findings, current, name, True)
-    if not current.model.has_history:
-        return least
-    whole = required_gain(findings, current, name)
-    if current.misfit <= 1.0:
-        return whole
-    values = sum(block.values for block in current.model.blocks if block.name != "rest")
-    rest = (1.0 - CRITERIA.naming.second_left) * (current.misfit - 1.0) * values / 2.0
-    return min(whole, max(least, rest))
-
-
 def _with_required_gains(
-    evaluator: Evaluator, findings: Findings, current: Trial, trials: list[Trial]
+    evaluator: Evaluator, findings: Findings, current: Trial, trials: list[Trial], seed: int
 ) -> list[Trial]:
     """Return the trials of a further cause, best first, with the gain that each must reach.
 
@@ -192,13 +184,22 @@ def _with_required_gains(
         findings: so far.
         current: model that they extend.
         trials: as fitted.
+        seed: of the draws for the structure that they leave.
     """
+    before = findings.remaining
 
     def needed(trial: Trial) -> float:
-        rest = removes_rest(current, trial)
-        return required_gain(findings, current, trial.model.names[-1], rest)
+        name = trial.model.names[-1]
+        least = required_gain(findings, current, name, True)
+        whole = required_gain(findings, current, name)
+        faint = before.significant and least < trial.gain <= whole
+        removes = removes_misfit(current, trial) or (
+            faint and removes_structure(before, structure_of(evaluator, trial.model, seed))
+        )
+        return least if removes else whole
 
-    least = [CRITERIA.naming.promising * needed(trial) for trial in trials]
+    names = [trial.model.names[-1] for trial in trials]
+    least = [CRITERIA.naming.promising * gain_to_try(findings, current, name) for name in names]
     trials = [
         replace(trial, required_gain=current.required_gain + needed(trial))
         for trial in settled_trials(evaluator, trials, current.model, least)
@@ -233,44 +234,8 @@ def _refits_nonlinear(findings: Findings, current: Trial, promising: np.ndarray)
     tool 1.5 mm off its place, whose tangent promises too little beside strain stiffening, loses
     unseen to another size of the block, which moves the visible sides by about as much.
     """
-    first = current.model.names == _known_names(findings)
+    first = current.model.names == known_names(findings)
     return first or findings.remaining.significant or bool(promising.any())
-
-
-def _known_names(findings: Findings) -> tuple[str, ...]:
-    return tuple(effect.name for effect in findings.known)
-
-
-def removes_rest(current: Trial, trial: Trial) -> bool:
-    """Return whether a further cause removes most of the misfit above noise that a model leaves.
-
-    Where a model leaves none there is nothing to remove.
-    """
-    left = current.misfit - 1.0
-    return left > 0.0 and trial.misfit - 1.0 <= CRITERIA.naming.second_left * left
-
-
-def required_gain(findings: Findings, current: Trial, name: str, rest: bool = False) -> float:
-    """Return the least gain [nats] of an effect as the next cause.
-
-    The mesh error is known for the stated setup only. A found cause changes it, and that change
-    could pass for another cause. A second cause must therefore gain a good deal more than chance,
-    and a share of the first gain unless significant structure is left, or unless it removes most of
-    what the first leaves. (Measured: on top of the only cause, of 84 to 14 780 nats, the best of
-    the catalogue has at most 40. Of two causes one can show a twentieth of what the other shows,
-    and leave no structure.) An effect without which nothing can be replayed was there when the
-    noise was measured, and is no first cause in this sense.
-
-    Args:
-        findings: so far.
-        current: model that the effect would extend.
-        name: of the effect.
-        rest: whether the effect removes most of the misfit above noise that the model leaves.
-    """
-    if current.model.names == _known_names(findings):
-        return findings.bound_of(name)
-    share = 0.0 if findings.remaining.significant or rest else CRITERIA.naming.second_share
-    return max(CRITERIA.naming.second_factor * findings.bound, share * current.gain)
 
 
 def _rescore(evaluator: Evaluator, findings: Findings) -> None:
