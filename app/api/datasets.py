@@ -88,7 +88,7 @@ async def upload(
     dataset appears whole or not at all.
     """
     _free(name, services)
-    archive = await _received(request, services)
+    archive = await _received(request, services, name)
     return job_out(_queue(services, name, {"archive": str(archive)}, key))
 
 
@@ -131,9 +131,11 @@ def _queue(services: Services, name: str, source: dict[str, str], key: str | Non
     return services.jobs.submit("import", job_request, f"import-{name}", key)
 
 
-async def _received(request: Request, services: Services) -> Path:
-    """Store the body below the uploads, named by its digest: the same archive sent twice is one
-    file.
+async def _received(request: Request, services: Services, name: str) -> Path:
+    """Store the body below the uploads, named by its digest and the dataset's name.
+
+    The same request sent twice is one file. An archive that is sent under two names is two files,
+    since each import deletes its own.
     """
     folder = services.settings.runs / UPLOADS
     folder.mkdir(parents=True, exist_ok=True)
@@ -149,7 +151,7 @@ async def _received(request: Request, services: Services) -> Path:
                 "send the dataset's folder packed as one of them",
                 key="body",
             )
-        whole = folder / f"{digest.hexdigest()[:32]}.archive"
+        whole = folder / f"{digest.hexdigest()[:32]}-{name}.archive"
         os.replace(coming, whole)
         return whole
     finally:

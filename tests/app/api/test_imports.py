@@ -136,6 +136,13 @@ def test_folders_are_imported_from_where_that_is_allowed_only(
             )
 
 
+def test_the_same_archive_under_two_names_is_two_datasets(palpate: Client, tmp_path: Path) -> None:
+    """The first import deleted the archive of the second."""
+    file = write_archive(tmp_path, "zip")
+    jobs = [palpate.import_archive(file, name) for name in ("first", "second")]
+    assert [palpate.wait(job["id"])["state"] for job in jobs] == ["done", "done"]
+
+
 def test_the_same_archive_under_the_same_key_is_one_import(
     client: httpx.Client, tmp_path: Path
 ) -> None:

@@ -11,13 +11,7 @@ import httpx
 import job_functions
 import pytest
 from launched_server import client_of, launched, until
-from small_dataset import write_valid_dataset
-
-PAIRS = [
-    {"cloud": [-0.034, 0.012, 0.342], "mesh": [0.0344, 0.0197, 0.0358]},
-    {"cloud": [0.021, -0.008, 0.351], "mesh": [-0.0344, 0.0197, 0.0358]},
-    {"cloud": [0.03, 0.02, 0.322], "mesh": [-0.0344, -0.0197, 0.0358]},
-]
+from small_dataset import PAIRS, write_valid_dataset
 
 
 @pytest.mark.more

@@ -7,10 +7,13 @@ import re
 import socket
 import time
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
+from entry_point import entry_point
 from raw_requests import answered, raw
 from websockets.sync.client import connect
 
@@ -18,6 +21,20 @@ from palpate.app.main import create_app
 from palpate.app.server.serve import serve
 from palpate.app.settings import Settings
 from palpate.foundation.errors import SetupError
+
+
+@pytest.fixture(
+    scope="module",
+    params=["a server in this process", pytest.param("the image's", marks=pytest.mark.more)],
+)
+def client(request: pytest.FixtureRequest, shared_place: Any) -> Iterator[httpx.Client]:
+    if request.param == "the image's":
+        with entry_point(shared_place.runs.parent) as (_, client):
+            yield client
+    else:
+        with request.getfixturevalue("serve")(shared_place.settings) as client:
+            yield client
+
 
 NAMES = [
     "%00",

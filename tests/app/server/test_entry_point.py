@@ -1,0 +1,199 @@
+"""Attacks and bad luck against the server that the image starts."""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import io
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tarfile
+import threading
+import time
+import zipfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import websockets
+from entry_point import ended, entry_point, ports, printed, taken_memory
+from job_functions import alive, family, gone
+from small_dataset import PAIRS, write_valid_dataset
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+pytestmark = pytest.mark.more
+LARGEST = 600.0
+"""Most memory that an attack may take over that of the idle server [MiB]."""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("image")
+
+
+@pytest.fixture(scope="module")
+def server(place: Path) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
+    with entry_point(place) as served:
+        yield served
+
+
+@pytest.fixture
+def client(server: tuple[subprocess.Popen[str], httpx.Client]) -> httpx.Client:
+    return server[1]
+
+
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """An archive of a valid dataset."""
+    folder = tmp_path_factory.mktemp("sent")
+    write_valid_dataset(folder / "block")
+    return Path(shutil.make_archive(str(folder / "sent"), "zip", folder, "block")).read_bytes()
+
+
+def import_of(client: httpx.Client, name: str, content: bytes) -> dict[str, Any]:
+    return dict(client.post(f"/api/imports?name={name}", content=content).raise_for_status().json())
+
+
+def fork_server(pid: int) -> int:
+    (found,) = [
+        child
+        for child in family(pid)
+        if b"forkserver" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    return found
+
+
+def test_fork_server_killed_while_a_job_starts_loses_no_job(
+    server: tuple[subprocess.Popen[str], httpx.Client], sent: bytes
+) -> None:
+    process, client = server
+    made = fork_server(process.pid)
+    os.kill(made, signal.SIGSTOP)
+    jobs = [import_of(client, "starts", sent)]
+    time.sleep(0.5)
+    os.kill(made, signal.SIGKILL)
+    jobs.append(import_of(client, "follows", sent))
+    assert [ended(client, job["id"])["error"] for job in jobs] == [None, None]
+
+
+def test_processes_of_a_registration_end_with_the_killed_server(tmp_path: Path) -> None:
+    write_valid_dataset(tmp_path / "datasets" / "small")
+    with entry_point(tmp_path) as (process, client):
+        before = set(family(process.pid))
+
+        def ask() -> None:
+            with contextlib.suppress(httpx.HTTPError):
+                client.post("/api/datasets/small/registrations", json={"pairs": PAIRS})
+
+        asking = threading.Thread(target=ask)
+        asking.start()
+        end = time.monotonic() + 60
+        while not (set(family(process.pid)) - before) and time.monotonic() < end:
+            time.sleep(0.02)
+        time.sleep(1.0)
+        children = family(process.pid)
+        process.kill()
+        process.wait()
+        asking.join()
+        assert children and gone(children, 20.0), [one for one in children if alive(one)]
+
+
+def test_second_server_on_the_same_datasets_leaves_an_import_alone(
+    server: tuple[subprocess.Popen[str], httpx.Client], place: Path, tmp_path: Path, sent: bytes
+) -> None:
+    process, client = server
+    before = set(family(process.pid))
+    job = import_of(client, "shared", sent)
+    end = time.monotonic() + 60
+    while not list((place / "datasets").glob(".*/*")) and time.monotonic() < end:
+        time.sleep(0.001)
+    held = set(family(process.pid)) - before
+    for one in held:
+        os.kill(one, signal.SIGSTOP)
+    try:
+        with entry_point(tmp_path, "--datasets", str(place / "datasets")) as (_, other):
+            assert other.get("/health").json() == {"status": "ok"}
+    finally:
+        for one in held:
+            os.kill(one, signal.SIGCONT)
+    done = ended(client, job["id"])
+    assert held and done["state"] == "done", done["error"]
+    assert (place / "datasets" / "shared" / "dataset.toml").is_file()
+
+
+def long_name(kind: bytes) -> bytes:
+    """A tar of 3 MB whose first header is a name of 3 GiB; gzip files may follow one another."""
+    info = tarfile.TarInfo("././@LongLink")
+    info.type, info.size = kind, 3 * 2**30
+    head = gzip.compress(info.tobuf(tarfile.USTAR_FORMAT))
+    return head + gzip.compress(b"a" * 2**26) * 48
+
+
+def empty_rows() -> bytes:
+    """A dataset in a zip, one table of which is 500 MB of line ends."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("block/dataset.toml", "format = 1\n")
+        with archive.open("block/touches.csv", "w", force_zip64=True) as sink:
+            for _ in range(500):
+                sink.write(b"\n" * 10**6)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("bomb", ["pax", "gnu", "zip"])
+def test_bomb_is_refused_and_takes_little_memory(
+    server: tuple[subprocess.Popen[str], httpx.Client],
+    bomb: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    process, client = server
+    kinds = {"pax": tarfile.XHDTYPE, "gnu": tarfile.GNUTYPE_LONGNAME}
+    content = long_name(kinds[bomb]) if bomb in kinds else empty_rows()
+    with taken_memory(process.pid) as taken:
+        answer = client.post(f"/api/imports?name={bomb}", content=content)
+        if answer.status_code < 300:
+            assert ended(client, answer.json()["id"], 150.0)["state"] == "failed"
+    with capsys.disabled():
+        sys.stdout.write(f"\n{bomb}: {len(content) / 1e6:.1f} MB take {taken[0]:.0f} MiB\n")
+    assert answer.status_code < 500 and taken[0] < LARGEST
+
+
+def test_inner_port_of_the_scene_refuses_strangers(
+    server: tuple[subprocess.Popen[str], httpx.Client],
+) -> None:
+    process, client = server
+    inner = ports(process.pid) - {client.base_url.port}
+    assert inner
+    for port in inner:
+        with pytest.raises(websockets.InvalidStatus, match="403"):
+            connect(
+                f"ws://127.0.0.1:{port}/", subprotocols=[Subprotocol("viser-v1.1.1")], proxy=None
+            )
+
+
+def test_three_hundred_jobs_have_an_id_each(client: httpx.Client, sent: bytes) -> None:
+    def post(number: int) -> httpx.Response:
+        return client.post(f"/api/imports?name=many-{number}", content=sent)
+
+    with ThreadPoolExecutor(16) as threads:
+        answers = list(threads.map(post, range(300)))
+        assert {answer.status_code for answer in answers} == {202}
+        names = [answer.json()["id"] for answer in answers]
+        assert len(set(names)) == 300
+        list(threads.map(lambda name: client.post(f"/api/jobs/{name}/cancel"), names))
+    assert {ended(client, name)["state"] for name in names} <= {"cancelled", "done"}
+
+
+def test_implausible_values_are_told_by_check(tmp_path: Path) -> None:
+    folder = write_valid_dataset(tmp_path / "block")
+    toml = folder / "dataset.toml"
+    toml.write_text(toml.read_text().replace("mass = 0.10401", "mass = 1e-5"))
+    text = printed("check", str(folder))
+    assert "1e-05" in text or "density" in text, text
