@@ -22,7 +22,16 @@ from typing import Any
 import httpx
 from job_functions import family
 
-__all__ = ["ended", "entry_point", "environment", "ports", "printed", "started", "taken_memory"]
+__all__ = [
+    "address_of",
+    "ended",
+    "entry_point",
+    "environment",
+    "ports",
+    "printed",
+    "started",
+    "taken_memory",
+]
 
 _ROOT = Path(__file__).parents[1]
 _DOCKERFILE = (_ROOT / "Dockerfile").read_text()
@@ -82,7 +91,7 @@ def started(
     )
 
 
-def _address(process: subprocess.Popen[str]) -> str:
+def address_of(process: subprocess.Popen[str]) -> str:
     """The address that a server prints as soon as it listens."""
     assert process.stdout is not None
     for line in process.stdout:
@@ -98,7 +107,7 @@ def entry_point(
     """A server and a client of it; arguments as for `started`."""
     with started(place, *arguments, more=more) as process:
         try:
-            url = _address(process)
+            url = address_of(process)
             with httpx.Client(base_url=url, timeout=120, trust_env=False) as client:
                 yield process, client
         finally:
