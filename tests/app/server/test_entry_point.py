@@ -25,6 +25,8 @@ import websockets
 from entry_point import ended, entry_point, ports, printed, taken_memory
 from job_functions import alive, family, gone
 from small_dataset import PAIRS, write_valid_dataset
+from soaking import Clock
+from swept import write_swept_phantom
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
@@ -173,13 +175,14 @@ def test_inner_port_of_the_scene_refuses_strangers(
     server: tuple[subprocess.Popen[str], httpx.Client],
 ) -> None:
     process, client = server
-    inner = ports(process.pid) - {client.base_url.port}
-    assert inner
-    for port in inner:
-        with pytest.raises(websockets.InvalidStatus, match="403"):
-            connect(
-                f"ws://127.0.0.1:{port}/", subprotocols=[Subprotocol("viser-v1.1.1")], proxy=None
-            )
+    spoken = [Subprotocol("viser-v1.1.1")]
+    page = f"ws://127.0.0.1:{client.base_url.port}/viser/page-00000000"
+    with connect(page, subprotocols=spoken, proxy=None):  # the scene starts with the first page
+        inner = ports(process.pid) - {client.base_url.port}
+        assert inner
+        for port in inner:
+            with pytest.raises(websockets.InvalidStatus, match="403"):
+                connect(f"ws://127.0.0.1:{port}/", subprotocols=spoken, proxy=None)
 
 
 def test_three_hundred_jobs_have_an_id_each(
@@ -205,6 +208,38 @@ def test_three_hundred_jobs_have_an_id_each(
     states = [ended(client, name)["state"] for name in names]
     assert states.count("done") == 1  # the others find the name taken
     assert {*states} <= {"done", "cancelled", "failed"}
+
+
+def test_clock_that_is_set_back_makes_no_negative_time(tmp_path: Path, sent: bytes) -> None:
+    clock = Clock(tmp_path / "clock")
+    with entry_point(tmp_path, more=clock.environment) as (process, client):
+        before = set(family(process.pid))
+        job = import_of(client, "timed", sent)
+        end = time.monotonic() + 60
+        while not set(family(process.pid)) - before and time.monotonic() < end:
+            time.sleep(0.005)
+        clock.set(-3600)
+        done = ended(client, job["id"])
+    took = done.get("seconds", done["finished"] - done["started"])
+    assert done["state"] == "done" and 0.0 <= took < 60.0
+
+
+def test_sweep_is_not_resumed_on_other_data(tmp_path: Path) -> None:
+    write_swept_phantom(tmp_path / "datasets" / "phantom")
+    with entry_point(tmp_path) as (_, client):
+        radius = {"parameter": "tool_radius.radius", "low": 4e-3, "high": 8e-3}
+        asked = {"dataset": "phantom", "parameters": [radius], "frames": 1}
+        many = {**asked, "method": "random", "points": 300, "seed": 6}
+        identity = client.post("/api/sweeps", json=many).json()["id"]
+        end = time.monotonic() + 120
+        while not client.get(f"/api/sweeps/{identity}/points").json()["points"]:
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        client.post(f"/api/jobs/{identity}/cancel")
+        with (tmp_path / "datasets" / "phantom" / "touches.csv").open("a") as table:
+            table.write("\n")
+        assert client.post(f"/api/jobs/{identity}/retry").status_code == 202
+        assert "digest" in ended(client, identity)["error"]["message"]
 
 
 def test_implausible_values_are_told_by_check(tmp_path: Path) -> None:
