@@ -21,7 +21,7 @@ from palpate.blind.calibration import brier, calibration_error
 from palpate.blind.case_results import CaseResult, read_results
 from palpate.blind.proportions import IntervalEstimate
 from palpate.diagnosis.criteria import CRITERIA
-from palpate.diagnosis.search.model_probabilities import probabilities
+from palpate.diagnosis.report.model_probabilities import probabilities
 from palpate.effects.elastic_material import YoungModulus
 from palpate.foundation.arrays import FloatArray
 

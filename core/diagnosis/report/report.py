@@ -17,9 +17,9 @@ from palpate.diagnosis.gain.surface_gain import SurfaceGain
 from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
+from palpate.diagnosis.report.model_probabilities import probabilities
 from palpate.diagnosis.report.remaining_error import small_remainder, unexplained_error
 from palpate.diagnosis.search.findings import Findings, Trial, shared_family
-from palpate.diagnosis.search.model_probabilities import probabilities
 from palpate.diagnosis.validation.checks import AllClearChecks
 from palpate.effects import NuisanceBlock
 

@@ -10,7 +10,7 @@ from blind_results import result
 
 from benchmarks.temperature_choice import best_temperature, loss, top_effect
 from palpate.blind.case_results import CaseResult
-from palpate.diagnosis.search.model_probabilities import probabilities
+from palpate.diagnosis.report.model_probabilities import probabilities
 
 NAMES = ("tool_radius", "gravity", "poisson_ratio", "stiff_inclusion")
 TRUE = 6.0
