@@ -22,8 +22,8 @@ from small_dataset import write_valid_dataset
 from soaking import Asked, Clock, SmallDisk, Soaked, small_disk
 from swept import write_swept_phantom
 
-pytestmark = pytest.mark.slow
 MINUTES = float(os.environ.get("SOAK_MINUTES", "60"))
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(60 * MINUTES + 7200)]
 SEED = int(os.environ.get("SOAK_SEED", "1"))
 FINISHED = {"done", "failed", "cancelled", "interrupted"}
 SWEEP = {
@@ -90,6 +90,7 @@ class Soak:
         self.tell(f"killed {server.kill_child(self.draw) or 'nothing'}")
 
     def kill_server(self, server: Soaked) -> None:
+        self.tell(f"the server of {server.runs} is killed")
         if not server.kill():
             self.left_behind.append(str(server.runs))
         if not server.start():  # it says that its folder cannot be written, and ends
@@ -128,7 +129,7 @@ class Soak:
                 if server.process is not None and server.process.poll() is not None:
                     self.tell(f"the server ended with {server.process.returncode}")
                     self.kill_server(server)
-            time.sleep(self.draw.choice([0.1, 2.0, 8.0, 8.0]))
+            time.sleep(self.draw.choice([0.1, 1.0, 4.0, 8.0]))
 
     def settle(self) -> None:
         """End all faults, repeat what is unsure, retry what was interrupted, and wait."""
