@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["import_dataset"]
 
-_MEMORY = 2**30
+_MEMORY = 2**29
 """Address space that the import of a dataset may take [bytes]."""
 
 

@@ -22,6 +22,10 @@ from palpate.foundation.errors import DatasetError
 __all__ = ["PlyHeader", "read_cloud", "read_header"]
 
 _LARGEST_HEADER = 2**14
+_MOST_POINTS = 6_000_000
+"""Of one cloud: depth cameras give up to five million."""
+_MOST_BYTES = 2**28
+"""Largest size of a file [bytes]; six million points as text take less."""
 _TYPES = {
     "char": "i1",
     "int8": "i1",
@@ -248,6 +252,7 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
             "expected all of them: the file is cut off, export or copy it again"
         )
         raise problem(file, text, key="vertex", value=header.count)
+    _check_limits(file, header, size)
     if header.order == "=" or any(element.has_list for element in rest):
         return
     expected = header.count * record + sum(element.count * element.record for element in rest)
@@ -257,6 +262,18 @@ def _check_size(file: str, header: PlyHeader, size: int, rest: list[_Element]) -
             "are there; export or copy it again"
         )
         raise problem(file, text, key="vertex", value=header.count)
+
+
+def _check_limits(file: str, header: PlyHeader, size: int) -> None:
+    if header.count > _MOST_POINTS:
+        text = f"has {header.count} points; expected at most {_MOST_POINTS}: thin the cloud"
+        raise problem(file, text, key="vertex", value=header.count)
+    if size > _MOST_BYTES:
+        text = (
+            f"has {size / 2**20:.0f} MiB; expected at most {_MOST_BYTES // 2**20}: leave out what "
+            "is not x, y, z, or thin the cloud"
+        )
+        raise problem(file, text, value=size)
 
 
 def _binary_points(file: str, header: PlyHeader, data: bytes) -> FloatArray:

@@ -153,22 +153,58 @@ def empty_rows() -> bytes:
     return file.getvalue()
 
 
-@pytest.mark.parametrize("bomb", ["pax", "gnu", "zip"])
+def large_cloud(sent: bytes) -> bytes:
+    """A dataset in a zip of 2 MB, whose rest cloud has 17 million points, most at one place."""
+    count = 17 * 10**6
+    properties = "".join(f"property float {axis}\n" for axis in "xyz")
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n"
+    noise = os.urandom(12 * 10**4)  # not so even that the ratio alone refuses it
+    file = io.BytesIO()
+    with (
+        zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive,
+        zipfile.ZipFile(io.BytesIO(sent)) as valid,
+    ):
+        for name in valid.namelist():
+            if not name.endswith("rest.ply"):
+                archive.writestr(name, valid.read(name))
+        with archive.open("block/rest.ply", "w", force_zip64=True) as sink:
+            sink.write(head.encode())
+            for _ in range(17):
+                sink.write(noise + bytes(12 * 10**6 - len(noise)))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("bomb", "told"),
+    [
+        ("pax", "a name or attribute in the archive has 3221225472 bytes"),
+        ("gnu", "a name or attribute in the archive has 3221225472 bytes"),
+        ("zip", "unpacked it is "),
+        ("cloud", "has 17000000 points"),
+    ],
+)
 def test_bomb_is_refused_and_takes_little_memory(
     server: tuple[subprocess.Popen[str], httpx.Client],
+    sent: bytes,
     bomb: str,
+    told: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     process, client = server
-    kinds = {"pax": tarfile.XHDTYPE, "gnu": tarfile.GNUTYPE_LONGNAME}
-    content = long_name(kinds[bomb]) if bomb in kinds else empty_rows()
+    content = {
+        "pax": lambda: long_name(tarfile.XHDTYPE),
+        "gnu": lambda: long_name(tarfile.GNUTYPE_LONGNAME),
+        "zip": empty_rows,
+        "cloud": lambda: large_cloud(sent),
+    }[bomb]()
     with taken_memory(process.pid) as taken:
         answer = client.post(f"/api/imports?name={bomb}", content=content)
+        error = answer.json()
         if answer.status_code < 300:
-            assert ended(client, answer.json()["id"], 150.0)["state"] == "failed"
+            error = ended(client, error["id"], 150.0)["error"]
     with capsys.disabled():
         sys.stdout.write(f"\n{bomb}: {len(content) / 1e6:.1f} MB take {taken[0]:.0f} MiB\n")
-    assert answer.status_code < 500 and taken[0] < LARGEST
+    assert answer.status_code < 500 and told in error["message"] and taken[0] < LARGEST
 
 
 def test_inner_port_of_the_scene_refuses_strangers(

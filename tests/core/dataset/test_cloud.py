@@ -126,3 +126,36 @@ def test_headers_that_are_none_are_quoted(header: str, words: str, tmp_path: Pat
         read_cloud(tmp_path, "cloud.ply")
     assert words in caught.value.message
     assert caught.value.where["file"] == "cloud.ply"
+
+
+@pytest.mark.parametrize(
+    ("count", "kinds", "told"),
+    [
+        (6_000_001, "float", "has 6000001 points; expected at most 6000000"),
+        (
+            5_000_000,
+            "double double double double double double",
+            "has 286 MiB; expected at most 256",
+        ),
+    ],
+)
+def test_clouds_larger_than_any_camera_gives_are_refused(
+    count: int, kinds: str, told: str, tmp_path: Path
+) -> None:
+    names = [
+        "float x",
+        "float y",
+        "float z",
+        *(f"{kind} c{n}" for n, kind in enumerate(kinds.split())),
+    ]
+    header = "|".join(f"property {name}" for name in names)
+    write(tmp_path, f"format binary_little_endian 1.0|element vertex {count}|{header}", b"")
+    with (tmp_path / "cloud.ply").open("ab") as sink:
+        width = sum(4 if name.startswith("float") else 8 for name in names)
+        sink.truncate(sink.tell() + count * width)
+    tracemalloc.start()
+    with pytest.raises(DatasetError, match=told):
+        read_cloud(tmp_path, "cloud.ply")
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert taken < 2**20
