@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import sqlite3
 from typing import Any
 
@@ -42,11 +43,20 @@ def disk_is_full(error: BaseException) -> bool:
 
 def as_dict(error: PalpateError) -> dict[str, Any]:
     """An error as `{kind, message, where}` with plain values."""
-    where = {
-        key: value if isinstance(value, (int, float, str, bool)) else str(value)
-        for key, value in error.where.items()
-    }
-    return {"kind": type(error).__name__, "message": error.message, "where": where}
+    where = {_text(key): _plain(value) for key, value in error.where.items()}
+    return {"kind": type(error).__name__, "message": _text(error.message), "where": where}
+
+
+def _plain(value: object) -> int | float | str | bool:
+    """A value that JSON has, or its text."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if isinstance(value, (int, float, bool)) else _text(str(value))
+
+
+def _text(text: str) -> str:
+    """Text that can be sent: halves of surrogate pairs, which a request may have, as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def status_code(error: PalpateError) -> int:

@@ -139,7 +139,7 @@ class EffectIn(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     effect: str
-    parameters: dict[str, float | str]
+    parameters: dict[str, FiniteFloat | str]
 
 
 class WhatIfRequest(BaseModel):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -65,7 +65,7 @@ class Services:
                 targets,
                 settings.preload,
                 [settings.datasets / STAGING],
-                lambda: _tidy(disk),
+                lambda jobs: _tidy(disk, jobs),
                 lambda: _admit(disk, settings.runs),
                 failed,
             ),
@@ -116,12 +116,7 @@ class Services:
 
     def awaited(self) -> frozenset[str]:
         """Archives that imports may still need."""
-        jobs = [
-            job
-            for job in self.jobs.all()
-            if job.kind == "import" and (job.state.can_be_retried or not job.state.is_finished)
-        ]
-        return frozenset(str(job.request.get("archive")) for job in jobs)
+        return _awaited(self.jobs.all())
 
     def close(self) -> None:
         """Cancel the running job and stop the inner viewer."""
@@ -131,11 +126,20 @@ class Services:
         self.interactive_solver.close()
 
 
-def _tidy(disk: Disk) -> str:
-    """Delete old caches if necessary; returns a text for the log, empty where there is nothing to
-    say.
+def _awaited(jobs: Iterable[Job]) -> frozenset[str]:
+    imports = [
+        job
+        for job in jobs
+        if job.kind == "import" and (job.state.can_be_retried or not job.state.is_finished)
+    ]
+    return frozenset(str(job.request.get("archive")) for job in imports)
+
+
+def _tidy(disk: Disk, jobs: Iterable[Job]) -> str:
+    """Delete old caches if necessary, but no archive that a job may still need; returns a text for
+    the log, empty where there is nothing to say.
     """
-    now = disk.trim()
+    now = disk.trim(spared=_awaited(jobs))
     return f"dropped {now.dropped / 2**20:.0f} MiB of the oldest caches" if now.dropped else ""
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import trimesh
 
@@ -10,8 +12,11 @@ from palpate.mesh.gmsh_fill import TetSpec, fill
 from palpate.mesh.tet_mesh import TetMesh
 from palpate.setup.fixed_region import FixedRegion, Plane
 from palpate.setup.setup import Shape
+from palpate.synthetic.bench.organ_shape import write_surface
 
-__all__ = ["box_surface", "dome", "filled_box"]
+__all__ = ["box_surface", "dome", "filled_box", "write_felt_shape"]
+
+_MARKS = [(0.03, 0.02, 0.03), (0.03, -0.02, 0.03), (-0.03, -0.02, 0.03), (-0.03, 0.02, 0.03)]
 
 
 def box_surface(size: tuple[float, float, float]) -> tuple[FloatArray, IntArray]:
@@ -51,3 +56,33 @@ def dome(
     triangles += [np.stack([last + here, last + beside, np.full(count, top)], 1)]
     triangles += [np.stack([beside, here, np.full(count, middle)], 1)]
     return Shape(vertices, np.concatenate(triangles), fixed or Plane(), "dome")
+
+
+def write_felt_shape(
+    root: Path, vertices: FloatArray, triangles: IntArray, surface: str = 'surface = "phantom.stl"'
+) -> Path:
+    """Write a dataset of a shape: one push into the middle of the top, felt.
+
+    Robot and phantom have one frame.
+    """
+    write_surface(root / "phantom.stl", vertices, triangles)
+    lines = [
+        'format = 1\nname = "felt"\n[phantom]\ngeometry = "mesh"',
+        surface,
+        'mass = 0.1\nfixed = "base"\n[tool]\nshape = "sphere"',
+        "radius = 0.005\n[landmarks]",
+        *(f"mark_{n} = {list(place)}" for n, place in enumerate(_MARKS)),
+        '[splits]\ntrain = ["p1"]',
+    ]
+    (root / "dataset.toml").write_text("\n".join(lines) + "\n")
+    rows = [f"mark_{n},{x},{y},{z}" for n, (x, y, z) in enumerate(_MARKS)]
+    (root / "touches.csv").write_text("\n".join(["landmark,x,y,z", *rows]) + "\n")
+    folder = root / "sequences" / "p1"
+    folder.mkdir(parents=True)
+    time = np.arange(0, 6, 0.02)
+    height = 0.045 - 0.014 * np.clip(np.minimum(time - 1, 5 - time), 0, 1)
+    rows = [f"{t:.2f},0,0,{z:.6f},0,0,0,1" for t, z in zip(time, height, strict=True)]
+    (folder / "kinematics.csv").write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]) + "\n")
+    rows = [f"{t:.2f},0,0,{max(0.035 - z, 0) * 30:.5f}" for t, z in zip(time, height, strict=True)]
+    (folder / "forces.csv").write_text("\n".join(["t,fx,fy,fz", *rows]) + "\n")
+    return root

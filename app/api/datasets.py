@@ -16,7 +16,7 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from palpate.app.http_errors import Conflict
-from palpate.app.jobs.job_records import Job
+from palpate.app.jobs.job_records import Job, JobState
 from palpate.app.jobs.job_results import job_out
 from palpate.app.reporting.json_values import dataset_summary
 from palpate.app.schemas import JobOut
@@ -87,9 +87,12 @@ async def upload(
     """Take the body as an archive and queue its import. The archive is checked completely; the
     dataset appears whole or not at all.
     """
-    _free(name, services)
+    await asyncio.to_thread(_free, name, services, key)
     archive = await _received(request, services, name)
-    return job_out(_queue(services, name, {"archive": str(archive)}, key))
+    job = await asyncio.to_thread(_queue, services, name, {"archive": str(archive)}, key)
+    if job.state is JobState.DONE:  # a repeated request
+        archive.unlink(missing_ok=True)
+    return job_out(job)
 
 
 @router.post("/imports/folder", status_code=202)
@@ -97,8 +100,12 @@ def folder(request: FolderRequest, services: CurrentServices, key: IdempotencyKe
     """Queue the import of a folder on the server's disk, from an allowed place. The folder is
     copied and not changed.
     """
-    _free(request.name, services)
-    path = Path(request.folder).resolve()
+    _free(request.name, services, key)
+    try:
+        path = Path(request.folder).resolve()
+        readable = path.is_dir()
+    except (OSError, ValueError) as error:  # too long for a name, or with a NUL
+        raise DatasetError(f"{request.folder} is no folder: {error}", key="folder") from error
     allowed = services.settings.import_roots
     if allowed is not None and not any(path.is_relative_to(root.resolve()) for root in allowed):
         raise DatasetError(
@@ -106,12 +113,15 @@ def folder(request: FolderRequest, services: CurrentServices, key: IdempotencyKe
             "--import-from FOLDER for one that may",
             key="folder",
         )
-    if not path.is_dir():
+    if not readable:
         raise DatasetError(f"{request.folder} is no folder that the server can read", key="folder")
     return job_out(_queue(services, request.name, {"folder": str(path)}, key))
 
 
-def _free(name: str, services: Services) -> None:
+def _free(name: str, services: Services, key: str | None) -> None:
+    """Raise Conflict where the name is taken, unless the request is known by its key."""
+    if services.jobs.knows(key):
+        return
     try:
         check_name(name, services.settings.datasets)
     except DatasetError as error:

@@ -98,7 +98,7 @@ def automatic(
 ) -> JobOut:
     """Queue the automatic registration of a dataset; the result is stored under a name."""
     folder, store = services.library.path(name), RegistrationStore(services.settings.runs, name)
-    if request.accept is not None:
+    if request.accept is not None and not services.jobs.knows(key):
         store.check_name(request.accept)
     job_request = {
         "dataset": str(folder),

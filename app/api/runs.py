@@ -24,6 +24,8 @@ from palpate.foundation.errors import RunError
 __all__ = ["router"]
 
 router = APIRouter(prefix="/runs", tags=["runs"])
+_DAMAGED = (RunError, AttributeError, KeyError, TypeError, ValueError)
+"""Errors of a report that is damaged or another program's."""
 
 
 @router.get("")
@@ -173,7 +175,7 @@ def _worst(replay: RecordedReplay) -> dict[str, Any]:
 def _listed(run: Run) -> dict[str, Any]:
     try:
         return _heading(run)
-    except (RunError, AttributeError, KeyError, TypeError):  # damaged, or of another program
+    except _DAMAGED:
         return {
             "id": run.name,
             "dataset": "?",

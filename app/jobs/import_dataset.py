@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,11 +56,16 @@ def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report)
     """Fill `aside`, check it, and rename it to `whole`; returns the dataset."""
     from palpate.dataset import open_dataset
     from palpate.dataset.dataset_problems import refuse_problems
+    from palpate.dataset.schema import read_config
 
     archive = Path(request["archive"]) if request.get("archive") else None
     try:
         with limited_memory(_MEMORY):
             root = _filled(request, archive, aside, part(report, 0.0, 0.4))
+            surface = read_config(root).surface
+        if surface:  # its check needs a library that maps more address space than the limit
+            importlib.import_module("open3d")
+        with limited_memory(_MEMORY):
             refuse_problems(root, part(report, 0.4, 1.0))
     except (DatasetError, MemoryError) as error:
         if archive is not None:

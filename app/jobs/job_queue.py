@@ -45,7 +45,7 @@ class JobQueue:
         preload: modules that the worker processes import in advance.
         beside: folders in which a job may hold another scratch folder of its id; other servers
             may use them, too.
-        tidy: is called before each job; its text goes into the job's log.
+        tidy: is called with all jobs before each one; its text goes into the job's log.
         admit: is called before a job is queued; it raises to refuse the job.
         failed: is called with the reason when the queue cannot go on.
     """
@@ -56,7 +56,7 @@ class JobQueue:
         targets: Mapping[str, str],
         preload: Iterable[str] = (),
         beside: Iterable[Path] = (),
-        tidy: Callable[[], str] = str,
+        tidy: Callable[[list[Job]], str] = lambda jobs: "",
         admit: Callable[[], object] = lambda: None,
         failed: Callable[[str], object] = log.critical,
     ) -> None:
@@ -95,7 +95,7 @@ class JobQueue:
         A second request with the same `key` gives the same job; raises Conflict if its content
         differs, and NoSpace where the results take more than they may.
         """
-        if key is None or self._records.by_key(key) is None:
+        if not self.knows(key):
             self._admit()
         while True:
             identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
@@ -111,6 +111,10 @@ class JobQueue:
                 return self._same(job)
         self._waiting.put(identity)
         return self.get(identity)
+
+    def knows(self, key: str | None) -> bool:
+        """Whether a job was queued with this key."""
+        return key is not None and self._records.by_key(key) is not None
 
     def get(self, identity: str) -> Job:
         """One job."""

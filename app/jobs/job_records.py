@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sqlite3
 import threading
@@ -17,6 +18,7 @@ from palpate.foundation.errors import RunError
 
 __all__ = ["Job", "JobRecords", "JobState", "Note"]
 
+log = logging.getLogger(__name__)
 SCHEMA = (
     """create table if not exists jobs (
     id text primary key, kind text not null, request text not null, state text not null,
@@ -123,35 +125,19 @@ class JobRecords:
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._lock = threading.Lock()
-        self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
         try:
-            self._migrate(path)
-        except BaseException:
-            self._database.close()
-            raise
+            self._database = _opened(path)
+        except sqlite3.DatabaseError as error:
+            if disk_is_full(error):
+                raise NoSpace from error
+            raise RunError(
+                f"{path} is no file of job records, or is damaged ({error}): move it away, and a "
+                "new one is made; the results stay",
+                file=str(path),
+            ) from error
         self._database.execute("pragma journal_mode=wal")
         self._database.execute("pragma synchronous=normal")
         self.version = 0
-
-    def _migrate(self, path: Path) -> None:
-        """Bring the tables to the present version."""
-        (known,) = self._database.execute("pragma user_version").fetchone()
-        there = {row[1] for row in self._database.execute("pragma table_info(jobs)")}
-        if known > VERSION:
-            raise RunError(
-                f"{path} was written by a later Palpate (version {known} of the file; this one "
-                f"reads up to {VERSION}): update Palpate, or name another folder of runs",
-                file=str(path),
-                value=known,
-            )
-        if known == VERSION:
-            return
-        if there:
-            _back_up(self._database, path.with_name(f"{path.stem}-version-{known}{path.suffix}"))
-        missing = [name for name in LATER if there and name not in there]
-        added = [f"alter table jobs add column {name} {LATER[name]}" for name in missing]
-        changes = [*SCHEMA, *added, KEYS, f"pragma user_version = {VERSION}"]
-        self._database.executescript(f"begin; {'; '.join(changes)}; commit;")
 
     def add(self, job: Job) -> bool:
         """Add a record; returns False, and adds nothing, where its id or its key is taken."""
@@ -268,9 +254,52 @@ def _stored(name: str, value: Any) -> Any:
 def _job(row: tuple[Any, ...]) -> Job:
     values = dict(zip(COLUMNS, row, strict=True))
     for name in JSON_COLUMNS:
-        values[name] = None if values[name] is None else json.loads(values[name])
+        values[name] = None if values[name] is None else _content(values[name])
     values["state"] = JobState(values["state"])
     return Job(**values)
+
+
+def _content(text: str) -> Any:
+    """The content of a JSON column; an empty object where it is damaged, so that the other jobs
+    are still listed.
+    """
+    try:
+        return json.loads(text)
+    except ValueError:
+        log.exception("a job's record is damaged")
+        return {}
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """Open the database, with its tables as of the present version."""
+    database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+    try:
+        _migrate(database, path)
+    except BaseException:
+        database.close()
+        raise
+    return database
+
+
+def _migrate(database: sqlite3.Connection, path: Path) -> None:
+    """Bring the tables to the present version."""
+    (known,) = database.execute("pragma user_version").fetchone()
+    there = {row[1] for row in database.execute("pragma table_info(jobs)")}
+    if known > VERSION:
+        raise RunError(
+            f"{path} was written by a later Palpate (version {known} of the file; this one "
+            f"reads up to {VERSION}): update Palpate, or name another folder of runs",
+            file=str(path),
+            value=known,
+        )
+    if known == VERSION:
+        return
+    if there:
+        _back_up(database, path.with_name(f"{path.stem}-version-{known}{path.suffix}"))
+    missing = [name for name in LATER if there and name not in there]
+    added = [f"alter table jobs add column {name} {LATER[name]}" for name in missing]
+    changes = [*SCHEMA, *added, KEYS, f"pragma user_version = {VERSION}"]
+    database.executescript(f"begin; {'; '.join(changes)}; commit;")
 
 
 def _back_up(database: sqlite3.Connection, path: Path) -> None:

@@ -68,7 +68,7 @@ def listed_result(
     """One result in a list; the content of a damaged file is left out."""
     try:
         return result_and_job(store, name, job, library)
-    except RunError:
+    except (RunError, AttributeError, KeyError, TypeError):  # damaged, or of another program
         empty = dict.fromkeys(("request", "summary", "data_changed"))
         return {"id": name, "job": job, **empty}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import re
 import shutil
@@ -31,6 +32,8 @@ ENDING = 10.0
 _PAUSES = (0.2, 1.0, 5.0)
 """Times before a job's process is started again, where the fork server has ended [s]: until the
 system has cleared a server that was killed, it counts as running and refuses connections."""
+_FILES = 1.0
+"""Time between two attempts while the server may open no more files [s]."""
 _NUMBERS = re.compile(r"\d+(\.\d+)?")
 
 
@@ -52,7 +55,7 @@ class JobRunner:
         targets: Mapping[str, str],
         preload: Iterable[str],
         beside: Iterable[Path],
-        tidy: Callable[[], str],
+        tidy: Callable[[list[Job]], str],
     ) -> None:
         self._records, self._targets = records, dict(targets)
         self._beside, self._tidy = tuple(beside), tidy
@@ -79,7 +82,7 @@ class JobRunner:
             error = {"kind": "Missing", "message": message, "where": {}}
             write(self.finish, identity, JobState.FAILED, error=error)
             return
-        if text := self._tidy():
+        if text := self._tidy(self._records.all()):
             write(self._records.note, identity, "info", text)
         scratch = Path(job.request["scratch"])
         write(scratch.mkdir, parents=True, exist_ok=True)
@@ -128,24 +131,41 @@ class JobRunner:
     def _started(self, job: Job) -> tuple[ForkServerProcess, Connection]:
         """Start a job's process; return it and the pipe of its messages.
 
-        A fork server that has ended is started again. Raises RunError where that does not help.
+        A fork server that has ended is started again. Raises RunError where that does not help, or
+        the server is closing.
         """
-        reason: Exception | None = None
-        for pause in (0.0, *_PAUSES):
-            if reason is not None:
-                text = f"its process did not start ({type(reason).__name__}); started again"
-                log.warning("%s: %s", job.id, text)
-                self.patience.write(self._records.note, job.id, "warning", text)
-                self.patience.closing.wait(pause)
+        pauses = list(_PAUSES)
+        while True:
             try:
-                return self._process(job)
+                started = self._process(job)
             except (EOFError, OSError) as error:
-                reason = error
-        raise RunError(
-            f"no process could be started for {job.id} in {1 + len(_PAUSES)} attempts "
-            f"({type(reason).__name__}: {reason}); it waits for the next start of the server",
-            job=job.id,
-        ) from reason
+                if not pauses or self.patience.closing.is_set():
+                    raise RunError(
+                        f"no process could be started for {job.id} in {1 + len(_PAUSES)} attempts "
+                        f"({type(error).__name__}: {error}); it waits for the next start of the "
+                        "server",
+                        job=job.id,
+                    ) from error
+                self._pause(job, error, pauses)
+            else:
+                self.patience.trouble = ""
+                return started
+
+    def _pause(self, job: Job, error: Exception, pauses: list[float]) -> None:
+        """Wait until a job's process may start: the next pause, or while files run out as long as
+        it takes.
+        """
+        if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+            self.patience.trouble = (
+                "the server has too many open files and connections to start a job's process; "
+                "jobs go on when some are closed"
+            )
+            self.patience.closing.wait(_FILES)
+            return
+        text = f"its process did not start ({type(error).__name__}); started again"
+        log.warning("%s: %s", job.id, text)
+        self.patience.write(self._records.note, job.id, "warning", text)
+        self.patience.closing.wait(pauses.pop(0))
 
     def _process(self, job: Job) -> tuple[ForkServerProcess, Connection]:
         here, there = self._context.Pipe()

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import hmac
+import re
 import secrets
 import time
 from collections.abc import Callable, Mapping
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from fastapi import APIRouter, Request
@@ -19,6 +19,9 @@ from palpate.app.server.tokens import Token
 __all__ = ["Login", "router"]
 
 COOKIE = "palpate_session"
+_SESSION = re.compile(rf"(?:^|;) *{COOKIE}=([A-Za-z0-9_-]{{1,100}}) *(?:;|$)")
+"""Its value among the cookies of a request. The standard library's parser takes time that grows
+with the square of a hostile header's length."""
 INSIDE = "palpate_inside"
 """Cookie that lets the page show "log out"; it authorises nothing."""
 LASTS = 12 * 3600.0
@@ -88,11 +91,8 @@ class Login:
 
 def session_of(headers: Mapping[str, str]) -> str:
     """The session that the cookie names; empty if there is none."""
-    try:
-        cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-    except CookieError:
-        return ""
-    return cookie.value if cookie else ""
+    found = _SESSION.search(headers.get("cookie", ""))
+    return found[1] if found else ""
 
 
 @router.get("/login")

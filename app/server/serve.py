@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -31,7 +32,7 @@ class Server(uvicorn.Server):
                 http=ImpatientProtocol,
                 log_level="warning",
                 ws_per_message_deflate=False,
-                ws_max_size=64 * 2**20,
+                ws_max_size=2**20,
                 timeout_graceful_shutdown=3,
             )
         )
@@ -63,6 +64,7 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
         SystemExit: the job queue has given up; the status is 1, the message on standard error.
     """
     _refuse_unwritable(app.state.settings.runs)
+    _allow_many_files()
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -86,6 +88,18 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
             server.run(sockets=[listener])
     if app.state.failure:
         raise SystemExit(app.state.failure)
+
+
+def _allow_many_files() -> None:
+    """Let this process open as many files as the system allows it: each connection is one, and the
+    usual thousand is soon taken.
+    """
+    if sys.platform != "win32":
+        import resource
+
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _refuse_unwritable(runs: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import lzma
 import shutil
 import tarfile
@@ -9,6 +10,7 @@ import zipfile
 import zlib
 from pathlib import Path, PurePosixPath
 
+from palpate.app.http_errors import NoSpace
 from palpate.app.storage.archive_reader import MOST_FILES, Entry, Found, entries_of, is_ignored
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
@@ -36,13 +38,22 @@ def unpack(archive: Path, target: Path, most: int, report: Report = silent) -> N
         zlib.error,
         lzma.LZMAError,
         EOFError,
+        IndexError,  # an empty name in a zip
         NotImplementedError,
         RuntimeError,
+        ValueError,
     ) as error:
-        raise DatasetError(
-            f"the archive cannot be read ({error}); pack it again as .zip or .tar.gz",
-            file=archive.name,
-        ) from error
+        raise _damaged(archive, error) from error
+    except OSError as error:
+        if error.errno not in (None, errno.EINVAL):  # the disk's, not the archive's
+            raise
+        raise _damaged(archive, error) from error
+
+
+def _damaged(archive: Path, error: Exception) -> DatasetError:
+    return DatasetError(
+        f"the archive cannot be read ({error}); pack it again as .zip or .tar.gz", file=archive.name
+    )
 
 
 def copy_folder(source: Path, target: Path, most: int, report: Report = silent) -> None:
@@ -101,8 +112,8 @@ def _write(checked: Found, target: Path, most: int, report: Report) -> None:
         raise _too_large(total, most)
     free = shutil.disk_usage(target.parent).free
     if total > 0.9 * free:
-        raise DatasetError(
-            f"{_shown(total)} are to be written and {_shown(free)} are free: make room", value=total
+        raise NoSpace(
+            f"{_shown(total)} are to be written and {_shown(free)} are free: make room, then retry"
         )
     _fill(entries, target, most, total, report)
 

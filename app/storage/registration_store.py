@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -14,7 +15,7 @@ import numpy as np
 from palpate.app.http_errors import Conflict, Missing
 from palpate.app.storage.result_store import NAME, ResultStore, read_object
 from palpate.dataset.accepted_registration import AcceptedRegistration, rest_digest
-from palpate.foundation.errors import RegistrationError
+from palpate.foundation.errors import RegistrationError, RunError
 from palpate.foundation.processes import ProcessPool
 
 if TYPE_CHECKING:
@@ -129,7 +130,12 @@ def register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -
         mesh: the same points on the phantom [m], phantom frame.
     """
     with ProcessPool(1) as pool:
-        return pool.submit(_register, dataset, cloud, mesh).result()
+        try:
+            return pool.submit(_register, dataset, cloud, mesh).result()
+        except BrokenProcessPool:
+            raise RunError(
+                "the process that registers ended, most likely for want of memory; try again"
+            ) from None
 
 
 def _register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) -> dict[str, Any]:

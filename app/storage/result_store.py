@@ -90,8 +90,11 @@ class ResultStore:
 def read_object(path: Path, kind: str, name: str) -> dict[str, Any]:
     """The JSON object in a file of a result; raises RunError where there is none."""
     try:
-        value = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+        text = path.read_text()
+        value = json.loads(text)
+        if "\\ud" in text.lower():  # half of a surrogate pair could not be sent
+            json.dumps(value, ensure_ascii=False).encode()
+    except (OSError, ValueError, RecursionError) as error:
         raise unusable(path.name, f"cannot be read ({error})", kind, name) from error
     if not isinstance(value, dict):
         raise unusable(path.name, f"holds {type(value).__name__}, expected an object", kind, name)

@@ -230,8 +230,10 @@ def read_touches(root: Path, config: DatasetConfig) -> Touches:
 
 def _check_repeats(file: str, names: list[str], positions: FloatArray) -> None:
     """Refuse repeated touches of one landmark that are too far apart to be of the same place."""
+    firsts: dict[str, int] = {}
     for row, name in enumerate(names):
-        apart = float(np.linalg.norm(positions[row] - positions[(first := names.index(name))]))
+        first = firsts.setdefault(name, row)
+        apart = float(np.linalg.norm(positions[row] - positions[first]))
         if apart > FARTHEST_REPEAT:
             text = (
                 f"landmark '{name}' was touched in row {first + FIRST_ROW} already, "
@@ -248,8 +250,10 @@ def _averaged_repeats(
     unique = list(dict.fromkeys(names))
     if len(unique) == len(names):
         return unique, positions, None
-    which = np.array([unique.index(name) for name in names])
-    means = np.array([positions[which == number].mean(axis=0) for number in range(len(unique))])
+    numbers = {name: number for number, name in enumerate(unique)}
+    which = np.array([numbers[name] for name in names])
+    counts = np.bincount(which)
+    means = np.stack([np.bincount(which, axis) / counts for axis in positions.T], axis=1)
     means.flags.writeable = False
     freedom = 3 * (len(names) - len(unique))
     if freedom < LEAST_FREEDOM:

@@ -11,9 +11,13 @@ from typing import Any
 
 import httpx
 import pytest
+from shapes import box_surface, write_felt_shape
 from small_dataset import write_valid_dataset
 
 from palpate.app.client import Client, JobError
+from palpate.app.jobs.job_records import Job, JobState
+from palpate.app.services import _tidy
+from palpate.app.storage.disk_usage import Disk
 
 
 @pytest.fixture(scope="module")
@@ -157,3 +161,44 @@ def test_the_same_archive_under_the_same_key_is_one_import(
         for _ in range(2)
     ]
     assert asked[0]["id"] == asked[1]["id"]
+
+
+def test_a_request_whose_answer_was_lost_is_answered_by_its_job(
+    palpate: Client, client: httpx.Client, tmp_path: Path, shared_place: Any
+) -> None:
+    file = write_archive(tmp_path, "zip")
+    headers = {"idempotency-key": "import-lost"}
+    answers = []
+    for _ in range(2):
+        content = file.read_bytes()
+        answers.append(client.post("/api/imports?name=lost", content=content, headers=headers))
+        palpate.wait(answers[-1].json()["id"])
+    assert [answer.status_code for answer in answers] == [202, 202]
+    assert answers[0].json()["id"] == answers[1].json()["id"]
+    assert not list((shared_place.runs / "uploads").iterdir())
+    other = client.post("/api/imports?name=lost", content=content)
+    assert other.status_code == 409
+
+
+def test_a_phantom_of_any_shape_is_imported(palpate: Client, tmp_path: Path) -> None:
+    """The check of its surface needs a library that is larger than the limit of memory."""
+    (tmp_path / "felt").mkdir()
+    folder = write_felt_shape(tmp_path / "felt", *box_surface((0.06, 0.04, 0.03)))
+    file = tmp_path / "felt.zip"
+    file.write_bytes(packed(folder))
+    assert palpate.wait(palpate.import_archive(file, "felt")["id"])["state"] == "done"
+
+
+def test_an_archive_that_waits_is_not_deleted_for_room(tmp_path: Path) -> None:
+    folder = tmp_path / "uploads"
+    folder.mkdir()
+    files = [folder / name for name in ("waits", "failed", "done")]
+    states = [JobState.QUEUED, JobState.FAILED, JobState.DONE]
+    for file in files:
+        file.write_bytes(bytes(1000))
+    jobs = [
+        Job(id=file.name, kind="import", request={"archive": str(file)}, state=state)
+        for file, state in zip(files, states, strict=True)
+    ]
+    assert "oldest caches" in _tidy(Disk(tmp_path, 0), jobs)
+    assert [file.exists() for file in files] == [True, True, False]

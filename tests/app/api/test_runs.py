@@ -81,8 +81,19 @@ def test_broken_run_is_409_and_does_not_hide_the_others(
     (shared_place.runs / "torn").mkdir()
     (shared_place.runs / "torn" / "report.json").write_text("{")
     assert client.get("/api/runs/torn").status_code == 409
+    damaged = {
+        "deep": '{"a":' * 20_000 + "1" + "}" * 20_000,
+        "half": '{"dataset": "\\ud800", "verdict": "found"}',
+        "kinds": '{"dataset": [1], "verdict": 5, "causes": [1, 2], "made_from": [3]}',
+    }
+    for name, text in damaged.items():
+        (shared_place.runs / name).mkdir()
+        (shared_place.runs / name / "report.json").write_text(text)
     verdicts = {run["id"]: run["verdict"] for run in client.get("/api/runs").json()}
-    assert verdicts == {"torn": "unreadable", base.rsplit("/", 1)[1]: "found"}
+    unreadable = dict.fromkeys(("torn", *damaged), "unreadable")
+    assert verdicts == {**unreadable, base.rsplit("/", 1)[1]: "found"}
+    for name in ("torn", *damaged):
+        shutil.rmtree(shared_place.runs / name)
 
 
 def test_run_tells_that_its_data_have_changed_since(

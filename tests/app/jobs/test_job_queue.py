@@ -137,7 +137,7 @@ def test_what_a_killed_job_made_beside_the_others_is_gone_and_it_is_done_once_mo
     beside = tmp_path / "datasets" / ".importing"
     (beside / "of-an-earlier-server").mkdir(parents=True)
     with closing(
-        JobQueue(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda: "made room")
+        JobQueue(tmp_path / "runs", TARGETS, beside=[beside], tidy=lambda jobs: "made room")
     ) as jobs:
         assert not list(beside.iterdir())
         job = ended(

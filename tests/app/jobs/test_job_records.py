@@ -80,3 +80,30 @@ def test_migration_that_was_interrupted_is_made_again(
     records = JobRecords(file)
     assert records.get("old").attempt == 1
     records.close()
+
+
+@pytest.mark.parametrize("content", [b"no database", b"SQLite format 3\0" + b"x" * 5000, None])
+def test_file_that_is_no_database_is_refused_with_what_to_do(
+    tmp_path: Path, content: bytes | None
+) -> None:
+    path = tmp_path / "jobs.sqlite"
+    if content is None:
+        path.mkdir()
+    else:
+        path.write_bytes(content)
+    with pytest.raises(RunError, match="move it away, and a new one is made"):
+        JobRecords(path)
+
+
+def test_damaged_record_does_not_hide_the_others(tmp_path: Path) -> None:
+    records = JobRecords(tmp_path / "jobs.sqlite")
+    for name in ("whole", "cut"):
+        assert records.add(Job(id=name, kind="sweep", request={"of": 1}))
+    records.close()
+    database = sqlite3.connect(tmp_path / "jobs.sqlite")
+    with database:
+        database.execute("update jobs set request = '{\"of' where id = 'cut'")
+    database.close()
+    records = JobRecords(tmp_path / "jobs.sqlite")
+    assert {job.id: job.request for job in records.all()} == {"whole": {"of": 1}, "cut": {}}
+    records.close()

@@ -9,7 +9,7 @@ import socket
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from multiprocessing import forkserver
 from pathlib import Path
 
@@ -32,6 +32,20 @@ def fork_server() -> int:
     return int(vars(forkserver)["_forkserver"]._forkserver_pid)
 
 
+@contextmanager
+def refusing(place: Path) -> Iterator[None]:
+    """Let the fork server refuse connections in the block, as one that is just ending does."""
+    server = vars(forkserver)["_forkserver"]
+    address = server._forkserver_address
+    with socket.socket(socket.AF_UNIX) as closed:
+        closed.bind(str(place / "closed"))
+    server._forkserver_address = str(place / "closed")
+    try:
+        yield
+    finally:
+        server._forkserver_address = address
+
+
 def count(jobs: JobQueue, tmp_path: Path, name: str) -> str:
     return jobs.submit("count", {"steps": 2, "result": str(tmp_path / name)}).id
 
@@ -51,14 +65,9 @@ def test_fork_server_that_is_killed_while_a_job_starts(jobs: JobQueue, tmp_path:
 def test_fork_server_that_still_dies_is_given_time(jobs: JobQueue, tmp_path: Path) -> None:
     """A killed process refuses connections for a while before it counts as ended."""
     fork_server()
-    server = vars(forkserver)["_forkserver"]
-    address = server._forkserver_address
-    with socket.socket(socket.AF_UNIX) as closed:
-        closed.bind(str(tmp_path / "closed"))
-    server._forkserver_address = str(tmp_path / "closed")
-    job = count(jobs, tmp_path, "one")
-    reached(jobs, jobs.get(job), lambda _: len(jobs.notes(job)) >= 2)
-    server._forkserver_address = address
+    with refusing(tmp_path):
+        job = count(jobs, tmp_path, "one")
+        reached(jobs, jobs.get(job), lambda _: len(jobs.notes(job)) >= 2)
     assert ended(jobs, jobs.get(job)).state is JobState.DONE
     assert any("ConnectionRefusedError" in note.text for note in jobs.notes(job))
 
@@ -116,17 +125,29 @@ def test_error_of_the_queue_puts_the_job_back_once(jobs: JobQueue, tmp_path: Pat
 def test_queue_that_cannot_start_processes_gives_up_aloud(tmp_path: Path) -> None:
     told: list[str] = []
     with closing(JobQueue(tmp_path / "runs", TARGETS, failed=told.append)) as jobs:
-        usual = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (3, usual[1]))
-        try:
+        fork_server()
+        with refusing(tmp_path):
             job = count(jobs, tmp_path, "never")
-            end = time.monotonic() + 20
+            end = time.monotonic() + 30
             while not told and time.monotonic() < end:
                 time.sleep(0.02)
-        finally:
-            resource.setrlimit(resource.RLIMIT_NOFILE, usual)
-        assert len(told) == 1 and "in 4 attempts (OSError" in told[0]
+        assert len(told) == 1 and "in 4 attempts (ConnectionRefusedError" in told[0]
         assert told[0].endswith(jobs.trouble)
         assert jobs.get(job).state is JobState.QUEUED
     with closing(JobQueue(tmp_path / "runs", TARGETS)) as jobs:
         assert ended(jobs, jobs.get(job)).state is JobState.DONE
+
+
+def test_queue_waits_while_no_more_files_can_be_opened(jobs: JobQueue, tmp_path: Path) -> None:
+    usual = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (3, usual[1]))
+    try:
+        job = count(jobs, tmp_path, "later")
+        end = time.monotonic() + 20
+        while "too many open files" not in jobs.trouble and time.monotonic() < end:
+            time.sleep(0.02)
+        time.sleep(8.0)  # longer than all pauses of a fork server that ended
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, usual)
+    assert ended(jobs, jobs.get(job)).state is JobState.DONE
+    assert not jobs.trouble

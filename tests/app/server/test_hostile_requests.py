@@ -18,6 +18,7 @@ from raw_requests import answered, raw
 from websockets.sync.client import connect
 
 from palpate.app.main import create_app
+from palpate.app.server.login import session_of
 from palpate.app.server.serve import serve
 from palpate.app.settings import Settings
 from palpate.foundation.errors import SetupError
@@ -159,3 +160,38 @@ def test_folder_that_cannot_be_written_is_told_before_an_address_is_printed() ->
     with pytest.raises(SetupError, match="no file can be made in /proc/nothing"):
         serve(app, "127.0.0.1", 0, told.append)
     assert not told
+
+
+HALF = '"\\ud800"'
+"""Half of a surrogate pair, which JSON may hold and no text can."""
+NOTHING = '{"effect": "tool_radius", "parameters": {"radius": NaN}}'
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/api/evaluations", f'{{"dataset": "small", "run": {HALF}}}'),
+        ("/api/evaluations", f'{{"dataset": "small", "trainings": [{HALF}]}}'),
+        ("/api/trainings", f'{{"dataset": "small", "run": {HALF}}}'),
+        ("/api/exports", f'{{"run": {HALF}}}'),
+        ("/api/replays", f'{{"dataset": "small", "sequences": [{HALF}]}}'),
+        ("/api/replays", f'{{"dataset": "small", "effects": [{NOTHING}]}}'),
+        ("/api/sessions/page-00000000/view", f'{{"run": {HALF}, "sequence": "a"}}'),
+        ("/api/imports/folder", '{"folder": "a\\u0000b", "name": "x"}'),
+        ("/api/imports/folder", f'{{"folder": "/{"y" * 300}", "name": "x"}}'),
+    ],
+)
+def test_no_value_of_a_body_is_a_fault_of_the_server(
+    client: httpx.Client, path: str, body: str
+) -> None:
+    headers = {"content-type": "application/json"}
+    answer = client.post(path, content=body, headers=headers)
+    assert 400 <= answer.status_code < 500, answer.text
+
+
+def test_cookies_are_read_in_no_time() -> None:
+    begun = time.monotonic()
+    assert session_of({"cookie": 'palpate_session="' + "\\a" * 30_000 + '"'}) == ""
+    assert session_of({"cookie": "other=1; palpate_session=abc-_1; more=2"}) == "abc-_1"
+    assert session_of({"cookie": "xpalpate_session=abc"}) == ""
+    assert time.monotonic() - begun < 1.0

@@ -9,6 +9,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from palpate.app.storage.archive import copy_folder, dataset_root, unpack
@@ -181,3 +182,20 @@ def test_progress_is_told(tmp_path: Path) -> None:
         lambda *said: told.append(said),
     )
     assert told and "file 1 of 2" in told[0][1]
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA, zipfile.ZIP_DEFLATED])
+def test_damaged_archives_of_every_method_are_told_as_damaged(tmp_path: Path, method: int) -> None:
+    path, rng = tmp_path / "a.zip", np.random.default_rng(0)
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr("a", bytes(rng.integers(0, 64, 5000, dtype=np.uint8)))
+    whole, told = path.read_bytes(), 0
+    for number in range(200):
+        data = bytearray(whole)
+        data[int(rng.integers(30, len(data)))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(bytes(data))
+        try:
+            unpack(path, tmp_path / f"into-{number}", MOST)
+        except DatasetError:
+            told += 1
+    assert told > 100

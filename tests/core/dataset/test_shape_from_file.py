@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shapes import box_surface
+from shapes import box_surface, write_felt_shape
 
 from palpate.dataset import open_dataset
 from palpate.dataset.check import check_dataset
@@ -21,38 +21,10 @@ from palpate.setup.setup import Shape
 from palpate.synthetic.bench.organ_shape import organ_surface, write_surface
 
 SIZE = (0.06, 0.04, 0.03)
-MARKS = [(0.03, 0.02, 0.03), (0.03, -0.02, 0.03), (-0.03, -0.02, 0.03), (-0.03, 0.02, 0.03)]
-
-
-def _dataset(
-    root: Path, vertices: FloatArray, triangles: IntArray, surface: str = 'surface = "phantom.stl"'
-) -> Path:
-    """One push into the middle of the top, felt; robot and phantom have one frame."""
-    write_surface(root / "phantom.stl", vertices, triangles)
-    lines = [
-        'format = 1\nname = "felt"\n[phantom]\ngeometry = "mesh"',
-        surface,
-        'mass = 0.1\nfixed = "base"\n[tool]\nshape = "sphere"',
-        "radius = 0.005\n[landmarks]",
-        *(f"mark_{n} = {list(place)}" for n, place in enumerate(MARKS)),
-        '[splits]\ntrain = ["p1"]',
-    ]
-    (root / "dataset.toml").write_text("\n".join(lines) + "\n")
-    rows = [f"mark_{n},{x},{y},{z}" for n, (x, y, z) in enumerate(MARKS)]
-    (root / "touches.csv").write_text("\n".join(["landmark,x,y,z", *rows]) + "\n")
-    folder = root / "sequences" / "p1"
-    folder.mkdir(parents=True)
-    time = np.arange(0, 6, 0.02)
-    height = 0.045 - 0.014 * np.clip(np.minimum(time - 1, 5 - time), 0, 1)
-    rows = [f"{t:.2f},0,0,{z:.6f},0,0,0,1" for t, z in zip(time, height, strict=True)]
-    (folder / "kinematics.csv").write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]) + "\n")
-    rows = [f"{t:.2f},0,0,{max(0.035 - z, 0) * 30:.5f}" for t, z in zip(time, height, strict=True)]
-    (folder / "forces.csv").write_text("\n".join(["t,fx,fy,fz", *rows]) + "\n")
-    return root
 
 
 def test_mesh_is_read_with_its_size_and_held_at_its_base(tmp_path: Path) -> None:
-    dataset = open_dataset(_dataset(tmp_path, *box_surface(SIZE)))
+    dataset = open_dataset(write_felt_shape(tmp_path, *box_surface(SIZE)))
     assert isinstance(dataset.geometry, Shape)
     assert dataset.config.size == pytest.approx(SIZE, abs=1e-7)
     assert not dataset.has_rest and not dataset.observed
@@ -61,7 +33,7 @@ def test_mesh_is_read_with_its_size_and_held_at_its_base(tmp_path: Path) -> None
 
 
 def test_force_only_mesh_is_registered_checked_and_set_up(tmp_path: Path) -> None:
-    dataset = open_dataset(_dataset(tmp_path, *box_surface(SIZE)))
+    dataset = open_dataset(write_felt_shape(tmp_path, *box_surface(SIZE)))
     found = register(dataset)
     assert found.camera is None and found.touch_rms < 1e-9
     assert setup_from(dataset, found).geometry is dataset.geometry
@@ -78,7 +50,7 @@ def test_force_only_mesh_is_registered_checked_and_set_up(tmp_path: Path) -> Non
 
 
 def test_rest_cloud_without_other_clouds_is_no_reason_to_register_a_camera(tmp_path: Path) -> None:
-    root = _dataset(tmp_path, *box_surface(SIZE))
+    root = write_felt_shape(tmp_path, *box_surface(SIZE))
     header = (
         "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
         "y\nproperty float z\nend_header\n0 0 0.4\n"
@@ -111,7 +83,7 @@ def _broken(case: str) -> tuple[FloatArray, IntArray]:
     ],
 )
 def test_surface_that_encloses_nothing_is_refused(tmp_path: Path, case: str, words: str) -> None:
-    root = _dataset(tmp_path, *_broken(case))
+    root = write_felt_shape(tmp_path, *_broken(case))
     with pytest.raises(DatasetError, match=words) as caught:
         open_dataset(root)
     assert caught.value.where["file"] == "phantom.stl"
@@ -130,13 +102,13 @@ def test_surface_that_encloses_nothing_is_refused(tmp_path: Path, case: str, wor
     ],
 )
 def test_surface_that_is_not_there_is_refused(tmp_path: Path, surface: str, words: str) -> None:
-    root = _dataset(tmp_path, *box_surface(SIZE), surface)
+    root = write_felt_shape(tmp_path, *box_surface(SIZE), surface)
     with pytest.raises(DatasetError, match=words):
         open_dataset(root)
 
 
 def test_file_that_is_no_surface_is_refused(tmp_path: Path) -> None:
-    root = _dataset(tmp_path, *box_surface(SIZE))
+    root = write_felt_shape(tmp_path, *box_surface(SIZE))
     (root / "phantom.stl").write_bytes(b"no surface at all")
     with pytest.raises(DatasetError, match=re.escape("phantom.stl: ")):
         open_dataset(root)
