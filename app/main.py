@@ -104,8 +104,9 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     _answer_problems(app)
 
     @app.get("/health", tags=["health"], responses={503: {"model": Health}})
-    def health(response: Response) -> Health:
+    async def health(response: Response) -> Health:
         """200 where all works, 503 where the job queue does not; the page shows the reason."""
+        # async, like the page: it answers also while slow requests take all threads.
         troubled = bool(app.state.services.jobs.trouble)
         response.status_code = 503 if troubled else 200
         return Health(status="troubled" if troubled else "ok")
@@ -125,7 +126,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         return Response(text, media_type="text/plain", headers=headers)
 
     @app.get("/", include_in_schema=False)
-    def page() -> FileResponse:
+    async def page() -> FileResponse:
         return FileResponse(settings.static / "index.html", headers={"cache-control": "no-cache"})
 
     app.mount("/static", StaticFiles(directory=settings.static), name="static")

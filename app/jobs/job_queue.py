@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import logging
+import os
 import queue
 import secrets
 import shutil
@@ -27,6 +28,8 @@ from palpate.foundation.errors import RunError, SetupError
 __all__ = ["JobQueue"]
 
 log = logging.getLogger(__name__)
+_LOCK = ".server"
+"""Name of the file that a server of a folder of runs locks."""
 _FAILURES = 3
 """Errors of the queue in a row after which it gives up."""
 _PAUSE = 1.0
@@ -62,6 +65,7 @@ class JobQueue:
     ) -> None:
         beside = tuple(beside)
         self._scratch = folder / ".making"
+        self._lock_file = folder / _LOCK
         self._alone = _take(folder)
         shutil.rmtree(self._scratch, ignore_errors=True)
         for place in beside:
@@ -85,7 +89,7 @@ class JobQueue:
     @property
     def trouble(self) -> str:
         """The reason why the queue does not work, or lately did not; empty without any."""
-        return self._runner.patience.trouble or self._stopped
+        return self._gone() or self._runner.patience.trouble or self._stopped
 
     def submit(
         self, kind: str, request: dict[str, Any], label: str = "job", key: str | None = None
@@ -95,6 +99,8 @@ class JobQueue:
         A second request with the same `key` gives the same job; raises Conflict if its content
         differs, and NoSpace where the results take more than they may.
         """
+        if gone := self._gone():
+            raise RunError(gone)
         if not self.knows(key):
             self._admit()
         while True:
@@ -182,6 +188,19 @@ class JobQueue:
         self._records.close()
         self._alone.close()
 
+    def _gone(self) -> str:
+        """Why records would be lost, where the folder was moved or deleted; else empty."""
+        try:
+            there = self._lock_file.stat().st_ino == os.fstat(self._alone.fileno()).st_ino
+        except OSError:
+            there = False
+        if there:
+            return ""
+        return (
+            f"the folder of runs {self._lock_file.parent} was moved, replaced or deleted while "
+            "this server worked in it: put it back, or restart the server"
+        )
+
     def _same(self, job: Job) -> Job:
         known = self._records.by_key(job.key or "")
         if known is None:
@@ -244,7 +263,7 @@ def _take(folder: Path) -> Any:
     for left behind.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    file = (folder / ".server").open("w")
+    file = (folder / _LOCK).open("w")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -19,6 +19,7 @@ from job_functions import TARGETS, ended, reached
 from palpate.app.http_errors import NoSpace
 from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import JobState
+from palpate.foundation.errors import RunError
 
 
 @pytest.fixture
@@ -151,3 +152,16 @@ def test_queue_waits_while_no_more_files_can_be_opened(jobs: JobQueue, tmp_path:
         resource.setrlimit(resource.RLIMIT_NOFILE, usual)
     assert ended(jobs, jobs.get(job)).state is JobState.DONE
     assert not jobs.trouble
+
+
+def test_folder_that_is_moved_away_takes_no_new_work(jobs: JobQueue, tmp_path: Path) -> None:
+    assert not jobs.trouble
+    (tmp_path / "runs").rename(tmp_path / "moved")
+    (tmp_path / "runs").mkdir()
+    assert "was moved, replaced or deleted" in jobs.trouble
+    with pytest.raises(RunError, match="put it back, or restart"):
+        count(jobs, tmp_path, "lost")
+    (tmp_path / "runs").rmdir()
+    (tmp_path / "moved").rename(tmp_path / "runs")
+    assert not jobs.trouble
+    assert ended(jobs, jobs.get(count(jobs, tmp_path, "kept"))).state is JobState.DONE
