@@ -118,7 +118,8 @@ def test_second_server_on_the_same_datasets_leaves_an_import_alone(
     before = set(family(process.pid))
     job = import_of(client, "shared", sent)
     end = time.monotonic() + 60
-    while not list((place / "datasets").glob(".*/*")) and time.monotonic() < end:
+    # Once there is a file, the worker has let go of the lock of the parent folder.
+    while not list((place / "datasets").glob(".*/*/*")) and time.monotonic() < end:
         time.sleep(0.001)
     held = set(family(process.pid)) - before
     for one in held:
