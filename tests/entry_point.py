@@ -109,6 +109,7 @@ def entry_point(
         try:
             url = address_of(process)
             with httpx.Client(base_url=url, timeout=120, trust_env=False) as client:
+                client.get("/health")  # is answered once its processes are there
                 yield process, client
         finally:
             process.send_signal(signal.SIGTERM)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-__all__ = ["PAIRS", "SIZE", "ply_bytes", "small_cloud", "write_valid_dataset"]
+__all__ = ["SIZE", "ply_bytes", "small_cloud", "write_valid_dataset"]
 
 SIZE = (0.0687, 0.0393, 0.0358)
 _ROBOT_FROM_PHANTOM = (Rotation.from_euler("xyz", [0.3, -0.2, 0.9]), np.array([0.12, -0.05, 0.20]))
@@ -43,13 +43,6 @@ train = ["poke-01"]
 validation = []
 test = ["drag-01"]
 """
-
-PAIRS = [
-    {"cloud": [-0.034, 0.012, 0.342], "mesh": [0.0344, 0.0197, 0.0358]},
-    {"cloud": [0.021, -0.008, 0.351], "mesh": [-0.0344, 0.0197, 0.0358]},
-    {"cloud": [0.03, 0.02, 0.322], "mesh": [-0.0344, -0.0197, 0.0358]},
-]
-"""Points of the rest cloud and of the mesh that belong together [m]."""
 
 
 def ply_bytes(points: np.ndarray) -> bytes:

@@ -10,6 +10,7 @@ import random
 import signal
 import subprocess
 import sys
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,20 +31,29 @@ _CLOCK = r"""
 #include <stdlib.h>
 #include <time.h>
 
-/* CLOCK_REALTIME as if somebody had set it: ahead by the seconds that stand in a file. */
+/* CLOCK_REALTIME as if somebody had set it: ahead by the seconds that stand in a file, or stopped
+   at them after a "=". */
 int clock_gettime(clockid_t id, struct timespec *now) {
     static int (*real)(clockid_t, struct timespec *);
     if (!real) real = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
     int result = real(id, now);
     if (id == CLOCK_REALTIME) {
         FILE *file = fopen(getenv("CLOCK_OFFSET"), "r");
-        long ahead = 0;
+        long seconds = 0;
         if (file) {
-            if (fscanf(file, "%ld", &ahead) == 1) now->tv_sec += ahead;
+            if (fscanf(file, "=%ld", &seconds) == 1) now->tv_sec = seconds;
+            else if (fscanf(file, "%ld", &seconds) == 1) now->tv_sec += seconds;
             fclose(file);
         }
     }
     return result;
+}
+
+time_t time(time_t *seconds) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    if (seconds) *seconds = now.tv_sec;
+    return now.tv_sec;
 }
 """
 
@@ -67,8 +77,15 @@ class Clock:
 
     def set(self, ahead: int) -> None:
         """Set it `ahead` of the true time [s]."""
+        self._write(str(ahead))
+
+    def stop(self) -> None:
+        """Let it stand at the present second."""
+        self._write(f"={time.time():.0f}")
+
+    def _write(self, text: str) -> None:
         aside = self._offset.with_suffix(".part")
-        aside.write_text(str(ahead))
+        aside.write_text(text)
         aside.replace(self._offset)
 
 
@@ -197,8 +214,9 @@ class Soaked:
             self.asked.append(asked)
             return
         self.refused[answer.status_code] = self.refused.get(answer.status_code, 0) + 1
+        if answer.status_code == 500:
+            sys.stderr.write(f"{asked.path}: {answer.text}\n")
         if answer.status_code in (500, 507):
-            sys.stderr.write(f"{asked.path}: {answer.text}\n" if answer.status_code == 500 else "")
             self.unsure.append(asked)
 
     def ask_again(self) -> None:

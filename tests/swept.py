@@ -4,13 +4,16 @@ to replay.
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
+from typing import Any
 
+import httpx
 from made_datasets import copy_dataset
 
 from palpate.synthetic import HiddenEffect, Scenario
 
-__all__ = ["write_swept_phantom"]
+__all__ = ["first_points", "write_swept_phantom"]
 
 
 def write_swept_phantom(folder: Path) -> Path:
@@ -28,3 +31,12 @@ def write_swept_phantom(folder: Path) -> Path:
     )
     copy_dataset(folder, scenario, 3)
     return folder
+
+
+def first_points(client: httpx.Client, identity: str) -> list[dict[str, Any]]:
+    """The points of a sweep over REST as soon as it has any."""
+    end = time.monotonic() + 120
+    while not (points := client.get(f"/api/sweeps/{identity}/points").json()["points"]):
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    return list(points)

@@ -18,14 +18,12 @@ from palpate.app.reporting.timeline_series import timeline_series
 from palpate.app.scene.model_layer import NO_INSIDE
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices
+from palpate.app.storage.result_store import DAMAGED
 from palpate.app.storage.run_store import RecordedReplay, Run
-from palpate.foundation.errors import RunError
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/runs", tags=["runs"])
-_DAMAGED = (RunError, AttributeError, KeyError, TypeError, ValueError)
-"""Errors of a report that is damaged or another program's."""
 
 
 @router.get("")
@@ -175,7 +173,7 @@ def _worst(replay: RecordedReplay) -> dict[str, Any]:
 def _listed(run: Run) -> dict[str, Any]:
     try:
         return _heading(run)
-    except _DAMAGED:
+    except DAMAGED:
         return {
             "id": run.name,
             "dataset": "?",

@@ -28,8 +28,6 @@ from palpate.foundation.errors import RunError, SetupError
 __all__ = ["JobQueue"]
 
 log = logging.getLogger(__name__)
-_LOCK = ".server"
-"""Name of the file that a server of a folder of runs locks."""
 _FAILURES = 3
 """Errors of the queue in a row after which it gives up."""
 _PAUSE = 1.0
@@ -65,7 +63,6 @@ class JobQueue:
     ) -> None:
         beside = tuple(beside)
         self._scratch = folder / ".making"
-        self._lock_file = folder / _LOCK
         self._alone = _take(folder)
         shutil.rmtree(self._scratch, ignore_errors=True)
         for place in beside:
@@ -191,14 +188,14 @@ class JobQueue:
     def _gone(self) -> str:
         """Why records would be lost, where the folder was moved or deleted; else empty."""
         try:
-            there = self._lock_file.stat().st_ino == os.fstat(self._alone.fileno()).st_ino
+            there = os.path.samestat(os.stat(self._alone.name), os.fstat(self._alone.fileno()))
         except OSError:
             there = False
         if there:
             return ""
         return (
-            f"the folder of runs {self._lock_file.parent} was moved, replaced or deleted while "
-            "this server worked in it: put it back, or restart the server"
+            f"the folder of runs {Path(self._alone.name).parent} was moved, replaced or deleted "
+            "while this server worked in it: put it back, or restart the server"
         )
 
     def _same(self, job: Job) -> Job:
@@ -263,7 +260,7 @@ def _take(folder: Path) -> Any:
     for left behind.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    file = (folder / _LOCK).open("w")
+    file = (folder / ".server").open("w")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -119,7 +119,7 @@ class JobRecords:
 
     A change raises NoSpace where the disk is full. A file of an earlier version is copied beside
     itself, as `jobs-version-0.sqlite`, before its tables are changed; RunError for one of a later
-    version.
+    version, or a damaged one.
     """
 
     def __init__(self, path: Path) -> None:

@@ -10,8 +10,7 @@ from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
 from palpate.app.schemas import JobOut
 from palpate.app.storage.dataset_library import Library
-from palpate.app.storage.result_store import ResultStore
-from palpate.foundation.errors import RunError
+from palpate.app.storage.result_store import DAMAGED, ResultStore
 
 __all__ = ["cancel_job", "job_of", "job_out", "listed_result", "names_and_jobs", "result_and_job"]
 
@@ -68,7 +67,7 @@ def listed_result(
     """One result in a list; the content of a damaged file is left out."""
     try:
         return result_and_job(store, name, job, library)
-    except (RunError, AttributeError, KeyError, TypeError):  # damaged, or of another program
+    except DAMAGED:
         empty = dict.fromkeys(("request", "summary", "data_changed"))
         return {"id": name, "job": job, **empty}
 

@@ -11,10 +11,13 @@ from typing import Any
 from palpate.app.http_errors import Missing
 from palpate.foundation.errors import RunError
 
-__all__ = ["NAME", "ResultStore", "read_object", "request_name"]
+__all__ = ["DAMAGED", "NAME", "ResultStore", "read_object", "request_name"]
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,199}")
 """Names of results and datasets: safe as the name of a file, also with an ending."""
+
+DAMAGED = (RunError, AttributeError, KeyError, TypeError, ValueError)
+"""Errors from a result that is damaged, or another program's."""
 
 
 class ResultStore:

@@ -12,7 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
-from swept import write_swept_phantom
+from swept import first_points, write_swept_phantom
 
 from palpate.app.settings import Settings
 
@@ -127,10 +127,7 @@ def test_a_stopped_sweep_is_not_resumed_on_other_data(
     with serve(settings(tmp_path)) as client:
         asked = {**ASKED, "method": "random", "points": 300, "seed": 6}
         identity = client.post("/api/sweeps", json=asked).json()["id"]
-        end = time.monotonic() + 120
-        while not client.get(f"/api/sweeps/{identity}/points").json()["points"]:
-            assert time.monotonic() < end
-            time.sleep(0.1)
+        first_points(client, identity)
         client.post(f"/api/sweeps/{identity}/cancel")
         before = client.get(f"/api/sweeps/{identity}").json()
         made = before["request"]["made_from"]["data"]

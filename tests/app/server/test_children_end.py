@@ -1,4 +1,4 @@
-"""No process of the server outlives it, however it ends."""
+"""No process of the server that the image starts outlives it, however it ends."""
 
 from __future__ import annotations
 
@@ -10,8 +10,16 @@ from pathlib import Path
 import httpx
 import job_functions
 import pytest
-from launched_server import client_of, launched, until
-from small_dataset import PAIRS, write_valid_dataset
+from entry_point import entry_point
+from launched_server import until
+from small_dataset import write_valid_dataset
+
+PAIRS = [
+    {"cloud": [-0.034, 0.012, 0.342], "mesh": [0.0344, 0.0197, 0.0358]},
+    {"cloud": [0.021, -0.008, 0.351], "mesh": [-0.0344, 0.0197, 0.0358]},
+    {"cloud": [0.03, 0.02, 0.322], "mesh": [-0.0344, -0.0197, 0.0358]},
+]
+"""Points of the rest cloud and of the mesh that belong together [m]."""
 
 
 @pytest.mark.more
@@ -19,7 +27,7 @@ from small_dataset import PAIRS, write_valid_dataset
 def test_processes_of_a_registration_end_with_a_killed_server(tmp_path: Path, wait: float) -> None:
     """Killed while the child starts, imports, and works."""
     write_valid_dataset(tmp_path / "datasets" / "small")
-    with launched(tmp_path) as process, client_of(tmp_path) as client:
+    with entry_point(tmp_path) as (process, client):
         before = set(job_functions.family(process.pid))
 
         def ask() -> None:
