@@ -112,7 +112,7 @@ function drawPanel() {
     fill(
       panel,
       element("div", { class: "eyebrow" }, "Jobs"),
-      element("h1", { class: "verdict" }, "What was asked for, and what became of it"),
+      element("h1", { class: "verdict" }, "Running, waiting and finished jobs"),
       element("div", { class: "jobs-list" }),
       diskUsage(tellDeleted),
       element(
@@ -130,7 +130,7 @@ function drawPanel() {
     /** @type {HTMLElement} */ (panel.querySelector(".jobs-list")),
     jobs,
     "panel",
-    "Nothing has been asked for yet: diagnose a dataset, or start a sweep.",
+    "There are no jobs yet: diagnose a dataset, or start a sweep.",
   );
 }
 
