@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.measurement.hole_rims import beside_holes
+from palpate.measurement.hole_rims import FULL, WIDTH, beside_holes
 
 ROWS, COLUMNS, PITCH = 60, 80, 2.5e-3
 
@@ -53,3 +53,13 @@ def test_cloud_of_few_readings_is_kept() -> None:
     known = np.zeros((ROWS, COLUMNS), dtype=bool)
     known[::10, ::10] = True
     assert not beside_holes(sights(known), np.ones(known.sum(), dtype=bool)).any()
+
+
+def test_readings_are_counted_as_by_their_distances() -> None:
+    known = np.random.default_rng(2).random((ROWS, COLUMNS)) > 0.2
+    rays = np.concatenate([sights(known), [[1.0, 0.0, 0.0]]])  # and a stray one far aside
+    between = np.linalg.norm(rays[:, None] - rays, axis=2)
+    spacing = np.median(np.sort(between, axis=1)[:: len(rays) // 500 + 1, 1])
+    count = (between <= WIDTH * spacing).sum(axis=1)
+    rim = beside_holes(rays, np.ones(len(rays), dtype=bool))
+    assert np.array_equal(rim, count < FULL * np.median(count)) and 0 < rim.sum() < len(rim)
