@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from functools import partial
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,7 +17,7 @@ from palpate.app.jobs.job_records import Job
 from palpate.app.jobs.whatif_process import FrameSolver, InteractiveSolver
 from palpate.app.scene.manual_registration import ManualRegistrations
 from palpate.app.scene.page_session import Sessions
-from palpate.app.scene.phantom import open_phantom
+from palpate.app.scene.phantom import Phantoms
 from palpate.app.scene.viser_server import SceneListener, ViewerServer
 from palpate.app.settings import Settings
 from palpate.app.storage.dataset_import import STAGING
@@ -27,12 +27,16 @@ from palpate.app.storage.registration_store import RegistrationStore
 from palpate.app.storage.run_store import RunStore
 from palpate.app.storage.stored_results import StoredResults
 
-__all__ = ["CurrentServices", "IdempotencyKey", "Services"]
+__all__ = ["ONE_WHOLE_READ", "CurrentServices", "IdempotencyKey", "Services"]
 
 
 @dataclass(frozen=True)
 class Services:
-    """The parts of a running server."""
+    """The parts of a running server.
+
+    Attributes:
+        whole_read: held by the request that reads a whole dataset, so that only one does.
+    """
 
     settings: Settings
     library: Library
@@ -44,6 +48,7 @@ class Services:
     manual_registrations: ManualRegistrations
     frame_solver: FrameSolver
     interactive_solver: InteractiveSolver
+    whole_read: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(1))
 
     @classmethod
     def open(
@@ -53,7 +58,7 @@ class Services:
         runs = RunStore(settings.runs)
         sessions, library = Sessions(runs), Library(settings.datasets)
         manual_registrations, disk = (
-            ManualRegistrations(partial(open_phantom, library)),
+            ManualRegistrations(Phantoms(library).open),
             Disk(settings.runs, settings.disk_limit),
         )
         return cls(
@@ -166,6 +171,16 @@ def _services(connection: HTTPConnection) -> Services:
 
 
 CurrentServices = Annotated[Services, Depends(_services)]
+
+
+async def _one_whole_read(services: CurrentServices) -> AsyncIterator[None]:
+    """Let one request at a time go on; the others wait without taking a thread."""
+    async with services.whole_read:
+        yield
+
+
+ONE_WHOLE_READ = Depends(_one_whole_read)
+"""Dependency of endpoints that read a whole dataset: the memory of several would add up."""
 
 IdempotencyKey = Annotated[
     str | None,

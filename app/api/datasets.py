@@ -20,7 +20,7 @@ from palpate.app.jobs.job_records import Job, JobState
 from palpate.app.jobs.job_results import job_out
 from palpate.app.reporting.json_values import dataset_summary
 from palpate.app.schemas import JobOut
-from palpate.app.services import CurrentServices, IdempotencyKey, Services
+from palpate.app.services import ONE_WHOLE_READ, CurrentServices, IdempotencyKey, Services
 from palpate.app.storage.archive_reader import is_archive
 from palpate.app.storage.dataset_import import UPLOADS, check_name
 from palpate.dataset.check import check_dataset
@@ -63,7 +63,7 @@ def one(name: str, services: CurrentServices) -> dict[str, Any]:
     return dataset_summary(services.library.open(name))
 
 
-@router.get("/datasets/{name}/check")
+@router.get("/datasets/{name}/check", dependencies=[ONE_WHOLE_READ])
 def check(name: str, services: CurrentServices) -> dict[str, Any]:
     """The same after reading every file, with warnings and missing data; 422 names the place of an
     error and the expected value.

@@ -11,14 +11,14 @@ from palpate.app.jobs.job_records import JobState
 from palpate.app.jobs.job_results import job_out
 from palpate.app.schemas import DiagnosisRequest, JobOut
 from palpate.app.server.pagination import RequestedPage, paginate
-from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.services import ONE_WHOLE_READ, CurrentServices, IdempotencyKey
 
 __all__ = ["router"]
 
 router = APIRouter(prefix="/diagnoses", tags=["diagnoses"])
 
 
-@router.post("", status_code=202)
+@router.post("", status_code=202, dependencies=[ONE_WHOLE_READ])
 def start(
     request: DiagnosisRequest, services: CurrentServices, key: IdempotencyKey = None
 ) -> JobOut:

@@ -11,7 +11,7 @@ from pydantic.config import JsonValue
 
 from palpate.app.jobs.job_results import job_out
 from palpate.app.schemas import JobOut, Point
-from palpate.app.services import CurrentServices, IdempotencyKey
+from palpate.app.services import ONE_WHOLE_READ, CurrentServices, IdempotencyKey
 from palpate.app.storage.registration_store import RegistrationStore, register
 from palpate.registration.point_pairs import fit_pairs
 
@@ -109,7 +109,7 @@ def automatic(
     return job_out(services.jobs.submit("registration", job_request, f"register-{name}", key))
 
 
-@router.post("")
+@router.post("", dependencies=[ONE_WHOLE_READ])
 def made(name: str, request: RegistrationRequest, services: CurrentServices) -> dict[str, Any]:
     """Fit the pairs, refine by ICP, and store the result if a name is given; 409 for a name that is
     taken.

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from weakref import WeakValueDictionary
 
 import numpy as np
 
 from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.registration_store import refuse_unregistrable
+from palpate.dataset.accepted_registration import rest_digest
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.camera.levelling import as_seen, levelled
 from palpate.registration.faces import IndexArray
 
-__all__ = ["Phantom", "open_phantom"]
+if TYPE_CHECKING:
+    from palpate.dataset import Dataset
+
+__all__ = ["Phantom", "Phantoms"]
+
+MOST_DRAWN = 500_000
+"""Points of a rest cloud that a page draws and picks from: of a larger cloud every second, every
+third and so on. ICP uses all points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +32,7 @@ class Phantom:
     """A phantom and its rest cloud.
 
     Attributes:
-        cloud: (n, 3) rest cloud [m], camera frame.
+        cloud: (n, 3) rest cloud as it is drawn [m], camera frame.
         size: edge lengths of the block [m].
         landmarks: places by name [m], phantom frame.
         stated: initial guess of phantom_from_camera in dataset.toml; None where there is none.
@@ -56,9 +67,28 @@ class Phantom:
         return as_seen(self.cloud) if kind == "camera" else levelled(self.cloud)
 
 
-def open_phantom(library: Library, name: str) -> Phantom:
-    """Read rest cloud and block of one dataset; RegistrationError where it cannot be registered."""
-    dataset = library.open(name)
-    refuse_unregistrable(dataset)
-    config = dataset.config
-    return Phantom(dataset.rest_cloud(), config.size, dict(config.landmarks), config.to_phantom)
+class Phantoms:
+    """Reads phantoms, one at a time. Pages that register the same phantom share one in memory."""
+
+    def __init__(self, library: Library) -> None:
+        self._library = library
+        self._lock = threading.Lock()
+        self._shared: WeakValueDictionary[tuple[str, bytes, str], Phantom] = WeakValueDictionary()
+
+    def open(self, name: str) -> Phantom:
+        """Rest cloud and block of one dataset; RegistrationError where it cannot be registered."""
+        with self._lock:
+            folder = self._library.path(name)
+            dataset = self._library.open(name)
+            refuse_unregistrable(dataset)
+            files = (name, (folder / "dataset.toml").read_bytes(), rest_digest(folder))
+            phantom = self._shared.get(files)
+            if phantom is None:
+                phantom = self._shared[files] = _read(dataset)
+            return phantom
+
+
+def _read(dataset: Dataset) -> Phantom:
+    cloud, config = dataset.rest_cloud(), dataset.config
+    drawn = cloud[:: -(-len(cloud) // MOST_DRAWN)].copy()
+    return Phantom(drawn, config.size, dict(config.landmarks), config.to_phantom)

@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 import websockets
 from entry_point import ended, entry_point, ports, printed, taken_memory
 from job_functions import family
-from small_dataset import write_valid_dataset
+from small_dataset import ply_bytes, small_cloud, write_valid_dataset
 from soaking import Clock
 from swept import first_points, write_swept_phantom
 from websockets.sync.client import connect
@@ -178,6 +179,32 @@ def test_bomb_is_refused_and_takes_little_memory(
     with capsys.disabled():
         sys.stdout.write(f"\n{bomb}: {len(content) / 1e6:.1f} MB take {taken[0]:.0f} MiB\n")
     assert answer.status_code < 500 and told in error["message"] and taken[0] < LARGEST
+
+
+def test_many_readers_of_a_large_dataset_take_little_memory(
+    server: tuple[subprocess.Popen[str], httpx.Client],
+    place: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Five checks and six registering pages at once, of a rest cloud of 4 million points."""
+    process, client = server
+    cloud = np.tile(small_cloud(), (4 * 10**6 // len(small_cloud()) + 1, 1))[: 4 * 10**6]
+    (write_valid_dataset(place / "datasets" / "large") / "rest.ply").write_bytes(ply_bytes(cloud))
+    client.timeout = httpx.Timeout(300.0)
+    ask = {
+        "check": lambda _: client.get("/api/datasets/large/check"),
+        "register": lambda page: client.post(
+            f"/api/sessions/page-{page:08d}/registering", json={"dataset": "large", "pairs": []}
+        ),
+    }
+    with taken_memory(process.pid) as taken, ThreadPoolExecutor(11) as readers:
+        asked = [readers.submit(ask["check"], 0) for _ in range(5)]
+        asked += [readers.submit(ask["register"], page) for page in range(6)]
+        answers = [one.result() for one in asked]
+    with capsys.disabled():
+        sys.stdout.write(f"\nreaders: 4 million points take {taken[0]:.0f} MiB\n")
+    assert all(answer.status_code == 200 for answer in answers), answers[-1].text
+    assert taken[0] < LARGEST
 
 
 def test_inner_port_of_the_scene_refuses_strangers(
