@@ -28,6 +28,9 @@ from palpate.foundation.errors import RunError, SetupError
 __all__ = ["JobQueue"]
 
 log = logging.getLogger(__name__)
+LONGEST_LABEL = 150
+"""Letters of a label in an id, so that the id can name a file: also an export's, which names its
+dataset's or run's."""
 _FAILURES = 3
 """Errors of the queue in a row after which it gives up."""
 _PAUSE = 1.0
@@ -101,7 +104,7 @@ class JobQueue:
         if not self.knows(key):
             self._admit()
         while True:
-            identity = f"{label}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
+            identity = f"{label[:LONGEST_LABEL]}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
             job = Job(
                 id=identity,
                 kind=kind,

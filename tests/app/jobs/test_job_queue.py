@@ -13,6 +13,7 @@ from job_functions import TARGETS, alive, ended, reached, scratch_is_clean
 from palpate.app.http_errors import Conflict, Missing, NoSpace
 from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import JobState
+from palpate.app.storage.result_store import NAME
 
 
 @pytest.fixture
@@ -162,6 +163,12 @@ def test_ids_that_would_collide_do_not(
     assert [job.id[-8:] for job in made] == ["00aa00aa", "11bb11bb"]
     assert {ended(jobs, job).state for job in made} == {JobState.DONE}
     assert len(list(tmp_path.glob("[ab]"))) == 2
+
+
+def test_id_of_a_long_label_is_a_name_also_after_another_label(jobs: JobQueue) -> None:
+    first = jobs.submit("count", {}, "x" * 200)
+    second = jobs.submit("count", {}, f"export-{first.id}")
+    assert NAME.fullmatch(second.id) and first.id != second.id
 
 
 def test_clock_that_is_set_back_changes_no_duration(
