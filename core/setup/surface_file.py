@@ -41,7 +41,8 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
     import trimesh
 
     try:
-        loaded = trimesh.load_mesh(path, process=False, maintain_order=True)
+        # A texture of 5000 x 5000 pixels would take 2.5 GB.
+        loaded = trimesh.load_mesh(path, process=False, maintain_order=True, skip_materials=True)
         vertices, triangles = (
             np.array(loaded.vertices, dtype=float),
             np.array(loaded.faces, dtype=np.int64),

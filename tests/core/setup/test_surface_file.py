@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from shapes import box_surface
 
 from palpate.foundation.errors import MeshError
@@ -27,6 +28,17 @@ def test_closed_surface_is_read_from_every_format(tmp_path, name):
     assert shape.volume == pytest.approx(np.prod(SIZE), rel=1e-6)
     assert len(shape.vertices) == 8 and len(shape.triangles) == 12  # an STL's 36 corners are merged
     assert shape.size == pytest.approx(SIZE)
+
+
+def test_texture_of_a_surface_is_not_read(tmp_path, monkeypatch):
+    path = _stored(tmp_path, *box_surface(SIZE), "organ.obj")
+    path.write_text("mtllib organ.mtl\nusemtl skin\n" + path.read_text())
+    (tmp_path / "organ.mtl").write_text("newmtl skin\nmap_Kd skin.png\n")
+    Image.new("RGB", (4, 4)).save(tmp_path / "skin.png")
+    opened = []
+    monkeypatch.setattr(Image, "open", lambda file, *_: opened.append(file))
+    shape = load_shape(path)
+    assert len(shape.vertices) == 8 and not opened
 
 
 def test_hole_is_reported_with_its_open_edges_and_place(tmp_path):
