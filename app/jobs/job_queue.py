@@ -104,7 +104,8 @@ class JobQueue:
         if not self.knows(key):
             self._admit()
         while True:
-            identity = f"{label[:LONGEST_LABEL]}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(4)}"
+            moment = time.strftime("%Y%m%d-%H%M%S")
+            identity = f"{label[:LONGEST_LABEL]}-{moment}-{secrets.token_hex(4)}"
             job = Job(
                 id=identity,
                 kind=kind,

@@ -15,7 +15,7 @@ from palpate.dataset.sequence import Sequence
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 
-__all__ = ["Contact", "ContactKind", "ToolMotion", "box_gap", "describe_motion", "smooth_path"]
+__all__ = ["Contact", "ContactKind", "ToolMotion", "describe_motion", "smooth_path"]
 
 ContactKind = Literal["top", "side", "drag"]
 
@@ -76,16 +76,6 @@ class ToolMotion:
         return any(contact.kind == kind for contact in self.contacts)
 
 
-def box_gap(points: FloatArray, size: tuple[float, float, float], radius: float) -> FloatArray:
-    """Gap (n,) [m] between a sphere centred at points (n, 3), phantom frame, and the box at rest;
-    negative inside.
-    """
-    beyond = _beyond(points, size)
-    return np.asarray(
-        np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0) - radius
-    )
-
-
 def describe_motion(
     dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform
 ) -> ToolMotion:
@@ -116,12 +106,6 @@ def smooth_path(sequence: Sequence, phantom_from_robot: Transform) -> tuple[Floa
     )
     means = [np.bincount(index, weights=column) / counts for column in (time, *points.T)]
     return means[0], np.stack(means[1:], axis=-1)
-
-
-def _beyond(points: FloatArray, size: tuple[float, float, float]) -> FloatArray:
-    # The base cannot be touched: below the top, only the sides count.
-    across = np.abs(points[..., :2]) - np.array(size[:2]) / 2
-    return np.concatenate([across, points[..., 2:] - size[2]], axis=-1)
 
 
 def _episodes(gap: FloatArray) -> list[slice]:

@@ -31,7 +31,7 @@ contribute in equal parts, and so does the sensor's gain."""
 
 def inclusion_grid(setup: Setup) -> tuple[Inclusion, ...]:
     """Return inclusions on a coarse grid of places in the block, five times as stiff as it."""
-    x, y, z = setup.box.size
+    x, y, z = setup.geometry.size
     return tuple(
         Inclusion(
             x=(i - 0.5 * 6) / 7 * x,

@@ -74,7 +74,8 @@ class BaseDetachment(Effect):
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [
-            cls(edge=edge, extent=0.35 * setup.box.size["xy".index(edge[1])]) for edge in _EDGES
+            cls(edge=edge, extent=0.35 * setup.geometry.size["xy".index(edge[1])])
+            for edge in _EDGES
         ]
 
     def apply(self, setup: Setup) -> Setup:

@@ -175,7 +175,7 @@ def material_points(setup: Setup, grid: Meshing, mesh: Mesh) -> MaterialPoints:
     spacing = grid.spacing if isinstance(grid, Grading | GridSpec) else None
     if spacing is None:
         return QuadraturePoints(mesh)
-    size = setup.box.size
+    size = setup.geometry.size
     nx, ny, nz = (
         int(np.clip(np.ceil(_CELLS_PER_EDGE * edge / spacing), 2, _MOST_CELLS)) for edge in size
     )

@@ -75,7 +75,7 @@ def mesh_in(block: Replay, setup: Setup, frame: Equilibrium) -> Mesh:
     """The frame's mesh, scaled to the setup's block if that has another size."""
     if setup.geometry == block.setup.geometry or not isinstance(frame.mesh, BoxMesh):
         return frame.mesh
-    return frame.mesh.scaled(np.array(setup.box.size) / np.array(block.setup.box.size))
+    return frame.mesh.scaled(np.array(setup.geometry.size) / np.array(block.setup.geometry.size))
 
 
 def tool_shift(block: Replay, setup: Setup, move: FloatArray) -> FloatArray:

@@ -162,7 +162,7 @@ def _untouched_points(
     if not len(times):
         return np.empty((0, 3))
     centres = setup.phantom_from_robot.apply(sequence.kinematics.position_at(times))
-    apart = np.linalg.norm(centres - setup.box.nearest(centres), axis=1)
+    apart = setup.geometry.distance(centres)
     near = apart <= setup.tool.radius + _CLEAR
     early = np.arange(int(near.argmax()) if near.any() else len(times))
     if not len(early):

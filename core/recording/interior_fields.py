@@ -53,7 +53,7 @@ class InteriorFields:
         axes: list[FloatArray] = []
         moved: list[FloatArray] = []
         energy: list[FloatArray] = []
-        longer = np.array(setup.box.size) / np.array((setup.registered or setup.box).size)
+        longer = setup.scale
         for frame in frames:
             mesh = frame.mesh
             if not isinstance(mesh, BoxMesh):

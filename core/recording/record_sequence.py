@@ -141,10 +141,10 @@ def compare_with_clouds(
 
 def _looks_alike(one: Setup, other: Setup) -> bool:
     """Whether an untouched block and a cloud look the same in both setups."""
-    return camera_model_for(one).same(camera_model_for(other)) and (one.box, one.registered) == (
-        other.box,
-        other.registered,
-    )
+    return camera_model_for(one).same(camera_model_for(other)) and (
+        one.geometry,
+        one.registered,
+    ) == (other.geometry, other.registered)
 
 
 def record(

@@ -9,15 +9,16 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.bounds import require_within
+from palpate.setup.geometry import Geometry
 
-__all__ = ["CLEARANCE", "Box", "distance_to_block"]
+__all__ = ["Box"]
 
 _SAMPLING = (35, 21, 19)
 """Number of points along x, y, z at which the surface is sampled."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Box:
+class Box(Geometry):
     """A block on its base, edge lengths (x, y, z) [m]."""
 
     size: tuple[float, float, float]
@@ -35,11 +36,6 @@ class Box:
     def high(self) -> FloatArray:
         """Highest corner (3,) [m]."""
         return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
-
-    @property
-    def height(self) -> float:
-        """Height [m]."""
-        return self.size[2]
 
     def nearest(self, points: FloatArray) -> FloatArray:
         """Points of the block (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where
@@ -83,17 +79,3 @@ class Box:
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {"size": list(self.size)}
-
-
-CLEARANCE = 1.5e-3
-"""A tool farther than this from the stated block [m] does not touch it, even if size or pose are
-slightly wrong."""
-
-
-def distance_to_block(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
-    """Distance (m,) [m] of points (m, 3) to the stated block; zero inside."""
-    low, high = (
-        np.array([-size[0] / 2, -size[1] / 2, 0.0]),
-        np.array([size[0] / 2, size[1] / 2, size[2]]),
-    )
-    return np.asarray(np.linalg.norm(centres - np.clip(centres, low, high), axis=1))

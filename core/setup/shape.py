@@ -12,6 +12,7 @@ import numpy as np
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 from palpate.setup.fixed_region import FixedRegion, Plane
+from palpate.setup.geometry import Geometry
 from palpate.setup.surface_file import check_surface, read_surface
 
 __all__ = ["Shape", "load_shape"]
@@ -22,7 +23,7 @@ _FLAT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Shape(Geometry):
     """A body within a closed surface, which is checked when the body is made.
 
     Two bodies are equal if they have the same surface, held in the same place.
@@ -82,11 +83,6 @@ class Shape:
         """Extent along x, y, z [m]."""
         x, y, z = (float(length) for length in self.high - self.low)
         return x, y, z
-
-    @property
-    def height(self) -> float:
-        """Height of the highest point [m]."""
-        return float(self.high[2])
 
     @property
     def corners(self) -> FloatArray:

@@ -14,7 +14,7 @@ from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
-from palpate.setup.box import CLEARANCE, distance_to_block
+from palpate.setup.geometry import CLEARANCE
 from palpate.setup.setup import Setup
 from palpate.sweep.parameter_space import ParameterSpace
 
@@ -87,7 +87,7 @@ def read_sweep_data(
         sequence = experiment.dataset.sequence(name)
         times = np.asarray(sequence.cloud_times)
         centres = setup.phantom_from_robot.apply(smooth_centres(sequence.kinematics, times))
-        touched = distance_to_block(setup.box.size, centres) <= setup.tool.radius + CLEARANCE
+        touched = setup.geometry.distance(centres) <= setup.tool.radius + CLEARANCE
         probes = np.cumsum(np.diff(touched.astype(int), prepend=0) > 0)
         near = np.flatnonzero(touched)
         if not len(near):

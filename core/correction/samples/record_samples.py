@@ -28,7 +28,7 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.tool_pose import tool_poses
 from palpate.mesh.stored_label import stored_label
 from palpate.replay.replay import Replay
-from palpate.setup.box import CLEARANCE, distance_to_block
+from palpate.setup.geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["make_samples"]
@@ -189,7 +189,7 @@ def _record(
 def _push_numbers(setup: Setup, centres: FloatArray) -> FloatArray:
     """Return the number of the push at each tool centre (f, 3) [m], from 1; 0 where it is clear."""
     reach = setup.tool.radius + CLEARANCE
-    touched = distance_to_block(setup.box.size, centres) <= reach
+    touched = setup.geometry.distance(centres) <= reach
     return np.where(touched, np.cumsum(np.diff(touched.astype(int), prepend=0) > 0), 0)
 
 

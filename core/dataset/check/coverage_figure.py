@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.dataset.folder import Dataset
-from palpate.dataset.tool_motion import box_gap, describe_motion, smooth_path
+from palpate.dataset.tool_motion import describe_motion, smooth_path
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.figure import new_figure, save_figure
 from palpate.foundation.frames import Transform
@@ -38,7 +38,7 @@ def coverage_picture(dataset: Dataset, phantom_from_robot: Transform, path: Path
         for name in dataset.sequences
     }
     depths = {
-        name: -1e3 * box_gap(points, dataset.config.size, dataset.config.tool_radius)
+        name: -1e3 * dataset.geometry.gap(points, dataset.config.tool_radius)
         for name, points in paths.items()
     }
     colours = LinearSegmentedColormap.from_list("depth", _DEPTHS)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.dataset.tool_motion import ContactKind, box_gap
+from palpate.dataset.tool_motion import ContactKind
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
@@ -101,11 +101,9 @@ class Push:
 
 
 def depth_reached(data: Sequence[Observations], setup: Setup) -> float:
-    """Return the median depth of earlier pushes [m], at most a third of the block."""
-    deepest = [
-        -box_gap(item.centres(setup), setup.box.size, setup.tool.radius).min() for item in data
-    ]
-    return float(np.clip(np.median(deepest), 1e-3, 0.3 * min(setup.box.size)))
+    """Return the median depth of earlier pushes [m], at most a third of the phantom."""
+    deepest = [-setup.geometry.gap(item.centres(setup), setup.tool.radius).min() for item in data]
+    return float(np.clip(np.median(deepest), 1e-3, 0.3 * min(setup.geometry.size)))
 
 
 def speed_reached(data: Sequence[Observations], setup: Setup) -> float:
@@ -113,7 +111,7 @@ def speed_reached(data: Sequence[Observations], setup: Setup) -> float:
     found = []
     for item in data:
         path = setup.phantom_from_robot.apply(item.kinematics.position_at(item.times))
-        near = box_gap(path, setup.box.size, setup.tool.radius) < 0
+        near = setup.geometry.gap(path, setup.tool.radius) < 0
         speed = np.linalg.norm(np.gradient(path, axis=0), axis=1) / np.maximum(
             np.gradient(item.times), 1e-6
         )

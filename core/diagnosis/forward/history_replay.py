@@ -16,7 +16,7 @@ from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.replay.replay import Equilibrium, Replay
-from palpate.setup.box import CLEARANCE, distance_to_block
+from palpate.setup.geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["HistoryReplay", "longest_step", "without_history"]
@@ -53,9 +53,7 @@ class HistoryReplay:
         self._frame: Equilibrium | None = None
         self._times, way = data.path(block.setup)
         self._way = moved.apply(way)
-        self._near = (
-            distance_to_block(block.setup.box.size, self._way) < block.setup.tool.radius + CLEARANCE
-        )
+        self._near = block.setup.geometry.distance(self._way) < block.setup.tool.radius + CLEARANCE
 
     def reach(self, centre: FloatArray, time: float | None) -> Equilibrium:
         """Return the equilibrium with the tool at a place, after everything that came before.

@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from palpate.dataset.tool_motion import box_gap
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
@@ -99,9 +98,9 @@ def loading_history_of(
         for number, frame in enumerate(frames)
         if frame.in_contact and np.isfinite(seen[number])
     )
-    depths = np.maximum(-box_gap(places, setup.box.size, setup.tool.radius), 0.0)
+    depths = np.maximum(-setup.geometry.gap(places, setup.tool.radius), 0.0)
     own = np.array([frames[number].tool.centre for number in touched]).reshape(-1, 3)
-    reached = np.maximum(-box_gap(own, setup.box.size, setup.tool.radius), 1e-6)
+    reached = np.maximum(-setup.geometry.gap(own, setup.tool.radius), 1e-6)
     shares = np.zeros((len(times), len(touched)))
     for begin, end in _pushes(depths):
         ends = times[begin], times[end - 1]

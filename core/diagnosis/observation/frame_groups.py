@@ -15,23 +15,12 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.force_record import ForceRecord
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
-from palpate.setup.box import distance_to_block
 from palpate.setup.setup import Setup
 
 __all__ = ["FAR", "Group", "Observations"]
 
 FAR = np.array([0.0, 0.0, 10.0])
 """Place that stands for a tool which is not there [m]."""
-
-
-def _depth(size: tuple[float, float, float], centres: FloatArray) -> FloatArray:
-    """Depth (m,) [m] of points (m, 3) below the nearest side of the stated block, negative outside.
-
-    The base does not count as a side.
-    """
-    sides = np.array([size[0] / 2, size[1] / 2]) - np.abs(centres[:, :2])
-    inside = np.minimum(sides.min(axis=1), size[2] - centres[:, 2])
-    return np.where(inside > 0, inside, -distance_to_block(size, centres))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +101,7 @@ class Observations:
         places = self._places(setup)
         for group, centre in zip(self.groups, self.centres(setup), strict=True):
             own = places[list(group.frames)]
-            if group.free and (distance_to_block(setup.box.size, own) < setup.tool.radius).any():
+            if group.free and (setup.geometry.distance(own) < setup.tool.radius).any():
                 return False
             if (
                 not group.free
@@ -162,19 +151,16 @@ class Observations:
         The deepest push determines how far a base slides, even if no cloud was taken there.
         """
         times, path = self.path(setup)
-        depths = _depth(setup.box.size, path)
+        depths = -setup.geometry.facing(path)[0]
+        own = -setup.geometry.facing(self.centres(setup))[0]
         places: list[int | None] = []
         last = np.inf
-        for group, centre in zip(self.groups, self.centres(setup), strict=True):
+        for group, depth in zip(self.groups, own, strict=True):
             instant = self.instant(group, setup)
             now = np.inf if instant is None else instant
             between = np.flatnonzero((times > last) & (times <= now))
             last = now
             deepest = int(between[np.argmax(depths[between])]) if len(between) else None
-            deeper = (
-                deepest is not None
-                and depths[deepest]
-                > _depth(setup.box.size, centre[None])[0] + CRITERIA.grouping.deeper_by
-            )
+            deeper = deepest is not None and depths[deepest] > depth + CRITERIA.grouping.deeper_by
             places.append(deepest if deeper else None)
         return places

@@ -19,7 +19,7 @@ from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.tool_pose import ToolShaft, tool_poses
-from palpate.setup.box import CLEARANCE, distance_to_block
+from palpate.setup.geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["observe", "observe_all"]
@@ -92,7 +92,7 @@ def observe(
     kinematics, times = sequence.kinematics, np.asarray(sequence.cloud_times)
     instants = times - setup.sensor.time_offset
     centres = setup.phantom_from_robot.apply(smooth_centres(kinematics, instants))
-    free = distance_to_block(setup.box.size, centres) > setup.tool.radius + CLEARANCE
+    free = setup.geometry.distance(centres) > setup.tool.radius + CLEARANCE
     poses = tool_poses(kinematics, instants, setup.phantom_from_robot, shaft)
     groups = (
         [Group((), rest[cleaner.clean(rest).indices], True, True, lowest=cleaner.lowest)]
@@ -148,7 +148,7 @@ def _forces(sequence: Sequence, setup: Setup) -> ForceRecord | None:
         smooth_centres(sequence.kinematics, sequence.forces.time)
     )
     return ForceRecord.of(
-        sequence.forces, distance_to_block(setup.box.size, centres) > setup.tool.radius + CLEARANCE
+        sequence.forces, setup.geometry.distance(centres) > setup.tool.radius + CLEARANCE
     )
 
 

@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.dataset import Kinematics
-from palpate.dataset.tool_motion import box_gap
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
@@ -49,7 +48,7 @@ def _turned(item: Observations, share: float) -> Observations:
 
 def _depths(item: Observations, setup: Setup) -> FloatArray:
     """Depth of the tool in the stated block (g,) [m] at each group; zero outside."""
-    return np.maximum(-box_gap(item.centres(setup), setup.box.size, setup.tool.radius), 0.0)
+    return np.maximum(-setup.geometry.gap(item.centres(setup), setup.tool.radius), 0.0)
 
 
 def shifted(data: Sequence[Observations], setup: Setup) -> list[Observations]:

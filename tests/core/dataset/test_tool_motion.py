@@ -9,8 +9,7 @@ import pytest
 from small_dataset import SIZE, write_valid_dataset
 
 from palpate.dataset import Dataset, Kinematics, Sequence, open_dataset
-from palpate.dataset.tool_motion import box_gap, describe_motion
-from palpate.foundation.arrays import FloatArray
+from palpate.dataset.tool_motion import describe_motion
 from palpate.foundation.frames import Transform
 
 TOP, RADIUS = SIZE[2], 0.005
@@ -35,22 +34,6 @@ def moving(*corners: tuple[float, float, float], seconds: float = 2.0) -> Sequen
     stamps = np.arange(0.05, ends[-1], 0.1)
     return Sequence(
         Path(), "made", Kinematics(time, path + noise, turn), stamps, ("",) * len(stamps), None
-    )
-
-
-def test_gap_is_the_distance_to_the_nearest_face_edge_or_corner() -> None:
-    half = np.array(SIZE) / 2
-    points: FloatArray = np.array(
-        [
-            [0, 0, TOP + 0.012],
-            [half[0] + 0.007, 0, 0.02],
-            [half[0] + 0.003, half[1] + 0.004, 0.02],
-            [0, 0, TOP - 0.002],
-            [half[0] - 0.001, 0, 0.02],
-        ]
-    )
-    np.testing.assert_allclose(
-        box_gap(points, SIZE, RADIUS), [0.007, 0.002, 0.0, -0.007, -0.006], atol=1e-12
     )
 
 

@@ -78,7 +78,7 @@ class RestCloud:
         residual = np.concatenate([means.mean[used], height])
         places = np.concatenate([centres, table])
         directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(height), 1))])
-        pivot = np.array([0.0, 0.0, setup.box.size[2]])
+        pivot = np.array([0.0, 0.0, setup.geometry.height])
         moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
         free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
         depth = sight.pose.inverse().apply(places)[:, 2]

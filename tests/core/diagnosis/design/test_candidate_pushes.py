@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from pushed_block import SETUP, SIZE, observed, poke
 
-from palpate.dataset.tool_motion import box_gap
 from palpate.diagnosis.design.candidate_pushes import Push, depth_reached, pushes, speed_reached
 
 RADIUS, DEPTH = SETUP.tool.radius, 6e-3
@@ -22,7 +21,7 @@ def test_every_side_but_the_base_is_tried():
 @pytest.mark.parametrize("push", PUSHES, ids=lambda push: push.text())
 def test_ball_goes_in_from_where_it_touches_as_deep_as_said(push):
     passing, deep, dragged, released = push.centres(RADIUS)
-    gaps = box_gap(np.array([passing, deep, dragged, released]), SIZE, RADIUS)
+    gaps = SETUP.geometry.gap(np.array([passing, deep, dragged, released]), RADIUS)
     np.testing.assert_allclose(gaps[:3], [-DEPTH / 2, -DEPTH, -DEPTH], atol=1e-12)
     assert gaps[3] > RADIUS
     assert np.linalg.norm(dragged - deep) == pytest.approx(0.012 if push.kind == "drag" else 0.0)

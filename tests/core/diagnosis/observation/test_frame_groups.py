@@ -20,7 +20,7 @@ from palpate.measurement.segmentation import Cleaner
 from palpate.mesh.box_mesh import GridSpec
 from palpate.registration.pose import small_motion
 from palpate.replay.replay import rest
-from palpate.setup.box import distance_to_block
+from palpate.setup.box import Box
 from palpate.setup.setup import Sensor
 
 CLEANER = Cleaner(size=SIZE, phantom_from_camera=POSE, tool_radius=5e-3, noise=4e-4)
@@ -86,18 +86,6 @@ def test_times_beyond_the_stream_read_its_ends():
     assert np.allclose(smooth_centres(stream, np.array([-5.0, 7.0]))[:, 0], [time[0], time[-1]])
 
 
-def test_distance_to_the_stated_block():
-    points = np.array(
-        [
-            [0, 0, TOP / 2],
-            [0, 0, TOP + 3e-3],
-            [SIZE[0] / 2 + 3e-3, 0, TOP + 4e-3],
-            [0, SIZE[1] / 2 + 2e-3, 0.01],
-        ]
-    )
-    assert np.allclose(distance_to_block(SIZE, points), [0, 3e-3, 5e-3, 2e-3])
-
-
 def test_groups_hold_frames_of_one_place_in_the_order_of_time(sequence):
     groups = _observed(sequence).groups
     centres = _two_pushes(np.arange(FRAMES) / RATE)
@@ -110,7 +98,7 @@ def test_groups_hold_frames_of_one_place_in_the_order_of_time(sequence):
     assert later == [(10, 3)]
     for group in groups:
         here = centres[list(group.frames)]
-        clear = distance_to_block(SIZE, here) > 6.5e-3
+        clear = Box(size=SIZE).distance(here) > 6.5e-3
         assert (clear == group.free).all()
         assert group.free or np.linalg.norm(here - here[0], axis=1).max() < CRITERIA.grouping.travel
     assert any(len(group.frames) > 1 for group in groups if not group.free)
@@ -140,7 +128,7 @@ def test_points_of_all_frames_of_a_group_are_cleaned_and_joined(sequence):
         raw = sum(sequence.count(frame) for frame in group.frames)
         assert min(0.5 * raw, CRITERIA.grouping.most_points_untouched) <= len(group.points) <= raw
         assert len(group.points) <= CRITERIA.grouping.most_points_untouched or not group.free
-        assert distance_to_block(SIZE, POSE.apply(group.points)).max() < 0.01
+        assert Box(size=SIZE).distance(POSE.apply(group.points)).max() < 0.01
 
 
 def test_rest_cloud_becomes_the_first_group(sequence):
@@ -170,7 +158,7 @@ def test_grouping_holds_only_under_its_own_clock(sequence):
     moved = _two_pushes(np.arange(FRAMES) / RATE - 0.12)
     for group in found.groups:
         here = moved[list(group.frames)]
-        assert ((distance_to_block(SIZE, here) > 6.5e-3) == group.free).all()
+        assert ((Box(size=SIZE).distance(here) > 6.5e-3) == group.free).all()
         assert group.free or np.linalg.norm(here - here[0], axis=1).max() < CRITERIA.grouping.travel
 
 

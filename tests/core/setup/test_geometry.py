@@ -1,0 +1,51 @@
+"""Each question to a geometry has one answer for a block and for the same block as a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import box_surface
+
+from palpate.setup.box import Box
+from palpate.setup.geometry import Geometry
+from palpate.setup.shape import Shape
+
+SIZE = (0.0687, 0.0393, 0.0358)
+X, Y, TOP = SIZE[0] / 2, SIZE[1] / 2, SIZE[2]
+
+
+@pytest.fixture(params=["block", "surface"])
+def body(request: pytest.FixtureRequest) -> Geometry:
+    return Box(size=SIZE) if request.param == "block" else Shape(*box_surface(SIZE))
+
+
+def test_bounds(body: Geometry) -> None:
+    np.testing.assert_allclose(body.low, [-X, -Y, 0.0])
+    np.testing.assert_allclose(body.high, [X, Y, TOP])
+    assert body.size == pytest.approx(SIZE) and body.height == pytest.approx(TOP)
+
+
+def test_distance_is_zero_inside(body: Geometry) -> None:
+    points = np.array(
+        [[0, 0, TOP / 2], [0, 0, TOP + 3e-3], [X + 3e-3, 0, TOP + 4e-3], [0, Y + 2e-3, 0.01]]
+    )
+    np.testing.assert_allclose(body.distance(points), [0, 3e-3, 5e-3, 2e-3], atol=1e-12)
+
+
+def test_gap_is_the_distance_to_the_nearest_side_edge_or_corner(body: Geometry) -> None:
+    points = np.array(
+        [
+            [0, 0, TOP + 0.012],
+            [X + 0.007, 0, 0.02],
+            [X + 0.003, Y + 0.004, 0.02],
+            [0, 0, TOP - 0.002],
+            [X - 0.001, 0, 0.02],
+        ]
+    )
+    gaps = body.gap(points, 5e-3)
+    np.testing.assert_allclose(gaps, [0.007, 0.002, 0.0, -0.007, -0.006], atol=1e-12)
+
+
+def test_normals_are_those_of_the_nearest_side(body: Geometry) -> None:
+    _, normals = body.facing(np.array([[0.01, 0.005, TOP + 2e-3], [-X + 1e-3, 0.002, 0.015]]))
+    np.testing.assert_allclose(normals, [[0, 0, 1], [-1, 0, 0]], atol=1e-12)
