@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.bounds import require_within
-from palpate.setup.geometry import Geometry
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["Box"]
 

@@ -12,7 +12,7 @@ import numpy as np
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 from palpate.setup.fixed_region import FixedRegion, Plane
-from palpate.setup.geometry import Geometry
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.surface_file import check_surface, read_surface
 
 __all__ = ["Shape", "load_shape"]

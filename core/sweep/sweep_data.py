@@ -14,7 +14,7 @@ from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
-from palpate.setup.geometry import CLEARANCE
+from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 from palpate.sweep.parameter_space import ParameterSpace
 

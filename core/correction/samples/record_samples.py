@@ -28,7 +28,7 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.tool_pose import tool_poses
 from palpate.mesh.stored_label import stored_label
 from palpate.replay.replay import Replay
-from palpate.setup.geometry import CLEARANCE
+from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["make_samples"]

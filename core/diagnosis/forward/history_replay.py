@@ -16,7 +16,7 @@ from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.replay.replay import Equilibrium, Replay
-from palpate.setup.geometry import CLEARANCE
+from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["HistoryReplay", "longest_step", "without_history"]

@@ -24,7 +24,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
-from palpate.setup.geometry import CLEARANCE
+from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["deepest_rows", "observe_each", "observe_forces", "pushed_places"]

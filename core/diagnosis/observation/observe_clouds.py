@@ -19,7 +19,7 @@ from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.tool_pose import ToolShaft, tool_poses
-from palpate.setup.geometry import CLEARANCE
+from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
 __all__ = ["observe", "observe_all"]

@@ -7,7 +7,7 @@ import pytest
 from shapes import box_surface
 
 from palpate.setup.box import Box
-from palpate.setup.geometry import Geometry
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.shape import Shape
 
 SIZE = (0.0687, 0.0393, 0.0358)
