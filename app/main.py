@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -30,7 +31,7 @@ from palpate.app.api import (
     trainings,
     whatif,
 )
-from palpate.app.http_errors import NoSpace, as_dict, disk_is_full, status_code
+from palpate.app.http_errors import Missing, NoSpace, as_dict, disk_is_full, status_code
 from palpate.app.jobs.tasks import TARGETS
 from palpate.app.schemas import PROBLEMS, Health
 from palpate.app.server import viser_proxy
@@ -45,6 +46,7 @@ from palpate.foundation.errors import PalpateError
 
 __all__ = ["create_app"]
 
+log = logging.getLogger(__name__)
 ABOUT = """Replay palpations, find what a simulation gets wrong, and measure the gain.
 
 Lengths are in m, pressures in Pa, times in s. The body of every error is `{kind, message, where}`.
@@ -79,11 +81,16 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     """
     login = Login(Token.load(settings.runs)) if settings.needs_login else None
 
+    def prepare() -> None:
+        if app.state.services is None:
+            app.state.services = Services.open(settings, dict(targets), partial(_fail, app))
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.services = Services.open(settings, dict(targets), partial(_fail, app))
+        prepare()
         yield
         app.state.services.close()
+        app.state.services = None
 
     app = FastAPI(
         title="Palpate",
@@ -96,6 +103,7 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     app.state.ending = threading.Event()
     app.state.failure, app.state.stop = "", app.state.ending.set
     app.state.settings, app.state.login = settings, login
+    app.state.services, app.state.prepare = None, prepare
     app.add_middleware(RequestGuard, settings=settings, login=login)
     for module in MODULES:
         app.include_router(module.router, prefix="/api", responses=PROBLEMS)
@@ -154,6 +162,12 @@ def _answer_problems(app: FastAPI) -> None:
             "where": {"key": place},
         }
         return JSONResponse(body, status_code=422)
+
+    @app.exception_handler(FileNotFoundError)
+    def gone(request: Request, error: FileNotFoundError) -> JSONResponse:
+        log.warning("%s %s: a file was gone", request.method, request.url.path, exc_info=error)
+        message = f"{request.url.path}: a file of it was deleted while it was read"
+        return JSONResponse(as_dict(missing := Missing(message)), status_code=status_code(missing))
 
     @app.exception_handler(Exception)
     def fault(request: Request, error: Exception) -> JSONResponse:

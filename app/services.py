@@ -35,6 +35,7 @@ class Services:
     """The parts of a running server.
 
     Attributes:
+        arriving: files of uploads that no job names yet.
         whole_read: held by the request that reads a whole dataset, so that only one does.
     """
 
@@ -48,6 +49,7 @@ class Services:
     manual_registrations: ManualRegistrations
     frame_solver: FrameSolver
     interactive_solver: InteractiveSolver
+    arriving: list[str]
     whole_read: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(1))
 
     @classmethod
@@ -61,6 +63,7 @@ class Services:
             ManualRegistrations(Phantoms(library).open),
             Disk(settings.runs, settings.disk_limit),
         )
+        arriving: list[str] = []
         return cls(
             settings=settings,
             library=library,
@@ -70,7 +73,7 @@ class Services:
                 targets,
                 settings.preload,
                 [settings.datasets / STAGING],
-                lambda jobs: _tidy(disk, jobs),
+                lambda jobs: _tidy(disk, jobs, arriving),
                 lambda: _admit(disk, settings.runs),
                 failed,
             ),
@@ -84,6 +87,7 @@ class Services:
             manual_registrations=manual_registrations,
             frame_solver=FrameSolver(),
             interactive_solver=InteractiveSolver(),
+            arriving=arriving,
         )
 
     def diagnose(
@@ -120,8 +124,14 @@ class Services:
         return {"registration": accepted.to_json()}
 
     def awaited(self) -> frozenset[str]:
-        """Archives that imports may still need."""
-        return _awaited(self.jobs.all())
+        """Archives that uploads and imports may still need."""
+        return _awaited(self.jobs.all(), self.arriving)
+
+    def is_awaited(self, archive: Path) -> bool:
+        """Whether an import, or another upload than the caller's, needs an archive."""
+        others = list(self.arriving)
+        others.remove(str(archive))
+        return str(archive) in _awaited(self.jobs.all(), others)
 
     def close(self) -> None:
         """Cancel the running job and stop the inner viewer."""
@@ -131,20 +141,20 @@ class Services:
         self.interactive_solver.close()
 
 
-def _awaited(jobs: Iterable[Job]) -> frozenset[str]:
+def _awaited(jobs: Iterable[Job], arriving: Iterable[str]) -> frozenset[str]:
     imports = [
         job
         for job in jobs
         if job.kind == "import" and (job.state.can_be_retried or not job.state.is_finished)
     ]
-    return frozenset(str(job.request.get("archive")) for job in imports)
+    return frozenset([*arriving, *(str(job.request.get("archive")) for job in imports)])
 
 
-def _tidy(disk: Disk, jobs: Iterable[Job]) -> str:
-    """Delete old caches if necessary, but no archive that a job may still need; returns a text for
+def _tidy(disk: Disk, jobs: Iterable[Job], arriving: Iterable[str]) -> str:
+    """Delete old caches if necessary, but no archive that may still be needed; returns a text for
     the log, empty where there is nothing to say.
     """
-    now = disk.trim(spared=_awaited(jobs))
+    now = disk.trim(spared=_awaited(jobs, arriving))
     return f"dropped {now.dropped / 2**20:.0f} MiB of the oldest caches" if now.dropped else ""
 
 
@@ -157,11 +167,12 @@ def _admit(disk: Disk, runs: Path) -> None:
         f"{one.kind} {one.name} ({one.bytes / 2**30:.2f} GiB)"
         for one in StoredResults(runs).largest(3)
     ]
+    first = f", first of all {', '.join(largest)}" if largest else ""
     raise NoSpace(
         f"the results take {(now.used - now.caches) / 2**30:.2f} GiB of the "
         f"{now.limit / 2**30:.2f} GiB that they may: delete what is no longer needed (Jobs on the "
-        f"page, or DELETE /api/disk/KIND/NAME), first of all {', '.join(largest)}; or start the "
-        "server with a larger --disk-limit"
+        f"page, or DELETE /api/disk/KIND/NAME){first}; or start the server with a larger "
+        "--disk-limit"
     )
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 from uuid import uuid4
@@ -24,7 +26,7 @@ from palpate.app.services import ONE_WHOLE_READ, CurrentServices, IdempotencyKey
 from palpate.app.storage.archive_reader import is_archive
 from palpate.app.storage.dataset_import import UPLOADS, check_name
 from palpate.dataset.check import check_dataset
-from palpate.foundation.errors import DatasetError
+from palpate.foundation.errors import DatasetError, PalpateError
 
 __all__ = ["router"]
 
@@ -88,10 +90,16 @@ async def upload(
     dataset appears whole or not at all.
     """
     await asyncio.to_thread(_free, name, services, key)
-    archive = await _received(request, services, name)
-    job = await asyncio.to_thread(_queue, services, name, {"archive": str(archive)}, key)
-    if job.state is JobState.DONE:  # a repeated request
-        archive.unlink(missing_ok=True)
+    folder = services.settings.runs / UPLOADS
+    coming = folder / f".{uuid4().hex}.part"
+    with _arriving(services, coming):
+        digest = await _received(request, coming)
+        # The same request sent twice is one file. An archive that is sent under two names is two,
+        # since each import deletes its own.
+        archive = folder / f"{digest[:32]}-{name}.archive"
+        with _arriving(services, archive):
+            os.replace(coming, archive)
+            job = await asyncio.to_thread(_queue_archive, services, name, archive, key)
     return job_out(job)
 
 
@@ -119,9 +127,12 @@ def folder(request: FolderRequest, services: CurrentServices, key: IdempotencyKe
 
 
 def _free(name: str, services: Services, key: str | None) -> None:
-    """Raise Conflict where the name is taken, unless the request is known by its key."""
+    """Raise Conflict where the name is taken, and NoSpace where there is no room for more results,
+    unless the request is known by its key.
+    """
     if services.jobs.knows(key):
         return
+    services.jobs.admit()
     try:
         check_name(name, services.settings.datasets)
     except DatasetError as error:
@@ -141,15 +152,33 @@ def _queue(services: Services, name: str, source: dict[str, str], key: str | Non
     return services.jobs.submit("import", job_request, f"import-{name}", key)
 
 
-async def _received(request: Request, services: Services, name: str) -> Path:
-    """Store the body below the uploads, named by its digest and the dataset's name.
+def _queue_archive(services: Services, name: str, archive: Path, key: str | None) -> Job:
+    """Queue the import of an archive. One that no import will take is deleted."""
+    try:
+        job = _queue(services, name, {"archive": str(archive)}, key)
+    except PalpateError:
+        if not services.is_awaited(archive):
+            archive.unlink(missing_ok=True)
+        raise
+    if job.state is JobState.DONE:  # a repeated request
+        archive.unlink(missing_ok=True)
+    return job
 
-    The same request sent twice is one file. An archive that is sent under two names is two files,
-    since each import deletes its own.
-    """
-    folder = services.settings.runs / UPLOADS
-    folder.mkdir(parents=True, exist_ok=True)
-    coming, digest = folder / f".{uuid4().hex}.part", hashlib.sha256()
+
+@contextmanager
+def _arriving(services: Services, file: Path) -> Iterator[None]:
+    """Spare a file in the block from being deleted for room."""
+    services.arriving.append(str(file))
+    try:
+        yield
+    finally:
+        services.arriving.remove(str(file))
+
+
+async def _received(request: Request, coming: Path) -> str:
+    """Store the body as this file, which is deleted where it is no archive; returns its digest."""
+    coming.parent.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256()
     try:
         with coming.open("wb") as sink:
             async for chunk in request.stream():
@@ -161,8 +190,7 @@ async def _received(request: Request, services: Services, name: str) -> Path:
                 "send the dataset's folder packed as one of them",
                 key="body",
             )
-        whole = folder / f"{digest.hexdigest()[:32]}-{name}.archive"
-        os.replace(coming, whole)
-        return whole
-    finally:
+    except BaseException:
         coming.unlink(missing_ok=True)
+        raise
+    return digest.hexdigest()

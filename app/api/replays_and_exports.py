@@ -12,11 +12,11 @@ from pydantic.config import JsonDict
 
 from palpate.app.http_errors import Missing
 from palpate.app.jobs.job_results import job_out
-from palpate.app.jobs.short_tasks import EXPORTS
 from palpate.app.schemas import EffectIn, JobOut
 from palpate.app.services import CurrentServices, IdempotencyKey
 from palpate.app.storage.registration_store import RegistrationStore
 from palpate.app.storage.result_store import NAME
+from palpate.app.storage.run_store import EXPORTS
 
 __all__ = ["router"]
 

@@ -33,7 +33,8 @@ def listed(
     """Runs, the newest first, each with its verdict, or `unreadable`. The header X-Total-Count has
     their number.
     """
-    return [_listed(run) for run in paginate(services.runs.all(), page, response)]
+    shown = paginate(services.runs.all(), page, response)
+    return [heading for run in shown if (heading := _listed(run)) is not None]
 
 
 @router.get("/{name}")
@@ -170,17 +171,20 @@ def _worst(replay: RecordedReplay) -> dict[str, Any]:
     return {key: finite(replay[key][frame]) for key in keys}
 
 
-def _listed(run: Run) -> dict[str, Any]:
+def _listed(run: Run) -> dict[str, Any] | None:
+    """The line of a run in a list; None where it was deleted while the list was made."""
     try:
         return _heading(run)
-    except DAMAGED:
+    except (*DAMAGED, FileNotFoundError):
+        if not run.path.is_dir():
+            return None
         return {
             "id": run.name,
             "dataset": "?",
             "folder": None,
             "verdict": "unreadable",
             "causes": [],
-            "created": run.path.stat().st_mtime,
+            "created": 0.0,
             "data_changed": None,
         }
 

@@ -8,7 +8,14 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
-from palpate.app.jobs.job_results import cancel_job, job_of, job_out, names_and_jobs, result_and_job
+from palpate.app.jobs.job_results import (
+    cancel_job,
+    job_of,
+    job_out,
+    listed_result,
+    names_and_jobs,
+    result_and_job,
+)
 from palpate.app.schemas import JobOut
 from palpate.app.server.pagination import RequestedPage, paginate
 from palpate.app.services import CurrentServices, IdempotencyKey
@@ -86,7 +93,15 @@ def listed(
     """
     store = SweepStore(services.settings.runs)
     rows = paginate(names_and_jobs(store, services.jobs), page, response)
-    return [{"id": name, "job": job, "begun": store.has_begun(name)} for name, job in rows]
+    return [
+        {
+            "id": name,
+            "job": job,
+            "begun": store.has_begun(name),
+            "data_changed": listed_result(store, name, job, services.library)["data_changed"],
+        }
+        for name, job in rows
+    ]
 
 
 @router.get("/{identity}")

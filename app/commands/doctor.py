@@ -15,8 +15,13 @@ __all__ = ["doctor"]
 def doctor(
     runs: Annotated[Path, typer.Option(help="Folder of finished diagnoses.")] = Path("runs"),
 ) -> None:
-    """Print versions, machine, settings, the last jobs and the log, without data or results."""
-    from palpate.app.server.diagnostics import diagnostics
+    """Print versions, machine, the settings of the last server, its last jobs and its log, without
+    data or results.
+    """
+    from palpate.app.server.diagnostics import diagnostics, noted_settings
 
-    settings = Settings(runs=runs)
-    typer.echo(diagnostics(runs, settings.model_dump(mode="json")), nl=False)
+    settings = noted_settings(runs)
+    if settings is None:
+        settings = {"no server was started with these runs": "the defaults follow"}
+        settings |= Settings(runs=runs).model_dump(mode="json")
+    typer.echo(diagnostics(runs, settings), nl=False)

@@ -99,10 +99,7 @@ class JobQueue:
         A second request with the same `key` gives the same job; raises Conflict if its content
         differs, and NoSpace where the results take more than they may.
         """
-        if gone := self._gone():
-            raise RunError(gone)
-        if not self.knows(key):
-            self._admit()
+        self.admit(key)
         while True:
             moment = time.strftime("%Y%m%d-%H%M%S")
             identity = f"{label[:LONGEST_LABEL]}-{moment}-{secrets.token_hex(4)}"
@@ -118,6 +115,15 @@ class JobQueue:
                 return self._same(job)
         self._waiting.put(identity)
         return self.get(identity)
+
+    def admit(self, key: str | None = None) -> None:
+        """Raise RunError where the records cannot be kept, and NoSpace where the results take more
+        than they may, unless a job is known by the key.
+        """
+        if gone := self._gone():
+            raise RunError(gone)
+        if not self.knows(key):
+            self._admit()
 
     def knows(self, key: str | None) -> bool:
         """Whether a job was queued with this key."""
@@ -159,6 +165,7 @@ class JobQueue:
             raise Missing(
                 f"job {identity} is a {job.kind}, which this version cannot do", job=identity
             )
+        self.admit()
         end = time.monotonic() + ENDING
         while identity in self._runner.running and job.state.is_finished and time.monotonic() < end:
             time.sleep(0.02)

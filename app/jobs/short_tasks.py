@@ -11,17 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.app.http_errors import Conflict
 from palpate.app.storage.registration_store import RegistrationStore
-from palpate.app.storage.run_store import Run, RunStore
+from palpate.app.storage.run_store import EXPORTS, Run, RunStore
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.progress import Report, part
 
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
 
-__all__ = ["EXPORTS", "export", "register", "replay"]
-
-EXPORTS = "exports"
-"""Folder below the runs in which exported files lie, a folder for each job."""
+__all__ = ["export", "register", "replay"]
 
 
 def register(request: dict[str, Any], report: Report) -> dict[str, Any]:

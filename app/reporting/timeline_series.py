@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.app.reporting.json_values import finite
 from palpate.app.storage.run_store import RecordedReplay, Run
+from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError
 
@@ -52,6 +53,10 @@ def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
         or None,
         "failed": {
             name: [int(at) for at in np.flatnonzero(codes)]
+            for name, codes in by_model(replay, "outcome").items()
+        },
+        "reasons": {
+            name: [Outcome.reason(int(code)) for code in codes if code]
             for name, codes in by_model(replay, "outcome").items()
         },
         "worst": worst_frames(replay["distance_raw"]),

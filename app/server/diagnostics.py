@@ -1,10 +1,12 @@
 """Diagnostics for the report of a fault: versions, machine, settings, log, last jobs.
 
-It contains no measurement, no token and no result; names of datasets and folders are in it.
+It contains no file of a dataset, no token and no result. Names of datasets and folders are in it,
+and so is a single value that an error message quotes.
 """
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import platform
@@ -18,13 +20,17 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import Any
 
-__all__ = ["LOG", "diagnostics", "write_log"]
+from palpate.dataset.provenance import software_of
+
+__all__ = ["LOG", "diagnostics", "note_settings", "noted_settings", "write_log"]
 
 LOG = "server.log"
 """File of the server's log, below the runs; older parts have a number behind the name."""
+_SETTINGS = "server.json"
+"""File of the settings that a server was started with last, below the runs."""
 _LARGEST, _PARTS = 2**20, 4
 _PACKAGES = "palpate viser fastapi uvicorn torch open3d trimesh numpy scipy numba".split()
-_LINES, _JOBS, _NOTES = 200, 10, 15
+_LINES, _JOBS, _NOTES = 400, 10, 15
 
 
 def write_log(runs: Path) -> None:
@@ -36,6 +42,20 @@ def write_log(runs: Path) -> None:
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     for name in (None, "uvicorn"):  # uvicorn passes nothing on
         logging.getLogger(name).addHandler(handler)
+
+
+def note_settings(runs: Path, settings: dict[str, Any]) -> None:
+    """Store the settings of a server, by name and without secrets, for `palpate doctor`."""
+    (runs / _SETTINGS).write_text(json.dumps(settings, indent=1))
+
+
+def noted_settings(runs: Path) -> dict[str, Any] | None:
+    """The settings that a server in these runs was started with last; None where none was."""
+    try:
+        noted = json.loads((runs / _SETTINGS).read_text())
+    except (OSError, ValueError):
+        return None
+    return noted if isinstance(noted, dict) else None
 
 
 def diagnostics(runs: Path, settings: dict[str, Any]) -> str:
@@ -59,6 +79,8 @@ def diagnostics(runs: Path, settings: dict[str, Any]) -> str:
 
 def _versions() -> Iterator[str]:
     yield f"python {sys.version.split()[0]}"
+    software = software_of()
+    yield f"commit {software['commit']}, sources {software['code']}"
     for name in _PACKAGES:
         try:
             yield f"{name} {metadata.version(name)}"
@@ -87,12 +109,14 @@ def _jobs(path: Path) -> Iterator[str]:
         yield f"cannot be read: {error}"
         return
     try:
-        for identity, *rest in database.execute(
+        for identity, *rest, error in database.execute(
             "select id, kind, state, attempt, fraction, error from jobs "
             "order by rowid desc limit ?",
             [_JOBS],
         ).fetchall():
             yield f"{identity}: " + ", ".join(str(value) for value in rest if value is not None)
+            if error is not None:
+                yield f"    {_told(error)}"
             notes = database.execute(
                 "select level, text from log where job = ? order by rowid desc limit ?",
                 [identity, _NOTES],
@@ -102,6 +126,15 @@ def _jobs(path: Path) -> Iterator[str]:
         yield f"cannot be read: {error}"
     finally:
         database.close()
+
+
+def _told(error: str) -> str:
+    """Kind and message of a stored error, without the values of its place."""
+    try:
+        stored = json.loads(error)
+        return f"{stored['kind']}: {stored['message']}"
+    except (ValueError, KeyError, TypeError):
+        return "an error that cannot be read"
 
 
 def _log(path: Path) -> list[str]:

@@ -11,6 +11,8 @@ __all__ = ["ImpatientProtocol"]
 
 HEAD, PAUSE = 5.0, 5.0
 """Time for the whole head of a request, and longest pause within a body [s]."""
+SLOWEST = 1000.0
+"""Least mean rate of a body [bytes/s], from `PAUSE` on."""
 
 
 class ImpatientProtocol(H11Protocol):
@@ -21,6 +23,7 @@ class ImpatientProtocol(H11Protocol):
 
     _timer: asyncio.TimerHandle | None = None
     _in_head = False
+    _begun, _received = 0.0, 0
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Wait for the first request."""
@@ -29,6 +32,7 @@ class ImpatientProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Take data, and wait for what the request lacks."""
+        self._received += len(data)
         super().data_received(data)
         self._wait()
 
@@ -45,8 +49,14 @@ class ImpatientProtocol(H11Protocol):
         if self._in_head and was_in_head and self._timer is not None:
             return  # the whole head has one limit, however its bytes drip
         self._stop()
-        if self._in_head or self.conn.their_state is h11.SEND_BODY:
-            self._timer = self.loop.call_later(HEAD if self._in_head else PAUSE, self._close)
+        now = self.loop.time()
+        if self._in_head or was_in_head:
+            self._begun, self._received = now, 0
+        if self._in_head:
+            self._timer = self.loop.call_later(HEAD, self._close)
+        elif self.conn.their_state is h11.SEND_BODY:
+            left = self._begun + PAUSE + self._received / SLOWEST - now
+            self._timer = self.loop.call_later(max(0.0, min(PAUSE, left)), self._close)
 
     def _stop(self) -> None:
         if self._timer is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import sqlite3
 import sys
 import tempfile
 from collections.abc import Callable
@@ -13,7 +14,8 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
-from palpate.app.server.diagnostics import write_log
+from palpate.app.http_errors import disk_is_full
+from palpate.app.server.diagnostics import note_settings, write_log
 from palpate.app.server.patience import ImpatientProtocol
 from palpate.foundation.errors import SetupError
 
@@ -57,10 +59,12 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
         app: the application of `create_app`.
         host: address to listen on.
         port: port to listen on; 0 takes a free one.
-        started: is called with the server's address as soon as the port is bound.
+        started: is called with the server's address as soon as the port is bound and the jobs are
+            opened.
 
     Raises:
-        SetupError: the port cannot be used, or the folder of runs not be written.
+        SetupError: the port cannot be used, or the folder of runs not be written, or another server
+            works in it.
         SystemExit: the job queue has given up; the status is 1, the message on standard error.
     """
     _refuse_unwritable(app.state.settings.runs)
@@ -80,14 +84,31 @@ def serve(app: FastAPI, host: str, port: int, started: Callable[[str], None]) ->
         # Clients that read the address can connect at once: the kernel queues them until the
         # server accepts.
         listener.listen()
+        _prepare(app)
+        write_log(app.state.settings.runs)
         name = f"[{host}]" if ":" in host else host
         started(f"http://{name}:{listener.getsockname()[1]}")
         server = Server(app)
-        write_log(app.state.settings.runs)
         with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C ends the server
             server.run(sockets=[listener])
     if app.state.failure:
         raise SystemExit(app.state.failure)
+
+
+def _prepare(app: FastAPI) -> None:
+    """Open the jobs and note the settings, before an address is told."""
+    settings = app.state.settings
+    try:
+        app.state.prepare()
+        note_settings(settings.runs, settings.model_dump(mode="json"))
+    except (OSError, sqlite3.Error) as error:
+        reason = "its disk is full: make room" if disk_is_full(error) else f"{error}"
+        raise SetupError(
+            f"the folder of runs {settings.runs} cannot be used ({reason}), "
+            "or choose another with --runs",
+            key="runs",
+            value=str(settings.runs),
+        ) from error
 
 
 def _allow_many_files() -> None:

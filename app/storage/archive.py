@@ -8,6 +8,7 @@ import shutil
 import tarfile
 import zipfile
 import zlib
+from itertools import islice
 from pathlib import Path, PurePosixPath
 
 from palpate.app.http_errors import NoSpace
@@ -60,15 +61,28 @@ def copy_folder(source: Path, target: Path, most: int, report: Report = silent) 
     """Copy a folder of plain files by the same rules; links are refused."""
     entries: list[Entry] = []
     bad: list[str] = []
-    for path in sorted(source.rglob("*")):
-        inside = PurePosixPath(path.relative_to(source).as_posix())
-        if is_ignored(str(inside)):
-            continue
-        if path.is_symlink() or not (path.is_file() or path.is_dir()):
-            bad.append(f"{inside}: is a link or no plain file")
-        elif path.is_file():
-            entries.append(Entry(inside, path.stat().st_size, lambda path=path: path.open("rb")))  # type: ignore[misc]
+    try:
+        found = sorted(islice(source.rglob("*"), 2 * MOST_FILES))
+        if len(found) == 2 * MOST_FILES:
+            raise DatasetError(f"{source} holds too much; expected one dataset", key="folder")
+        for path in found:
+            _sort(path, source, entries, bad)
+    except OSError as error:
+        raise DatasetError(
+            f"{source} cannot be read ({error}); name the folder of a dataset", key="folder"
+        ) from error
     _write((entries, bad), target, most, report)
+
+
+def _sort(path: Path, source: Path, entries: list[Entry], bad: list[str]) -> None:
+    """Add a path to the entries of a folder, or the reason why it may not be in a dataset."""
+    inside = PurePosixPath(path.relative_to(source).as_posix())
+    if is_ignored(str(inside)):
+        return
+    if path.is_symlink() or not (path.is_file() or path.is_dir()):
+        bad.append(f"{inside}: is a link or no plain file")
+    elif path.is_file():
+        entries.append(Entry(inside, path.stat().st_size, lambda: path.open("rb")))
 
 
 def dataset_root(folder: Path) -> Path:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palpate.app.storage.dataset_import import UPLOADS
+from palpate.app.storage.run_store import EXPORTS
 from palpate.app.storage.sweep_store import REPLAY_CACHE, SWEEPS
 from palpate.app.storage.training_store import SAMPLE_CACHE, TRAININGS
 
 __all__ = ["CACHES", "Disk", "Usage", "size_of"]
 
-CACHES = (f"{SWEEPS}/{REPLAY_CACHE}", f"{TRAININGS}/{SAMPLE_CACHE}", UPLOADS)
+CACHES = (f"{SWEEPS}/{REPLAY_CACHE}", f"{TRAININGS}/{SAMPLE_CACHE}", UPLOADS, EXPORTS)
 """Folders below the runs whose content can be computed, or uploaded, again."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import re
@@ -35,12 +36,18 @@ class ResultStore:
 
     def names(self) -> list[str]:
         """Names of all results that have begun, the newest first."""
-        return [path.parent.name for path in self._newest_first(f"*/{self.first}")]
+        return list(self.created())
 
     def created(self) -> dict[str, float]:
-        """Times of the last change of the first file [s since 1970] of all results, by name."""
-        paths = self._newest_first(f"*/{self.first}")
-        return {path.parent.name: path.stat().st_mtime for path in paths}
+        """Times of the last change of the first file [s since 1970] of all results, by name, the
+        newest first.
+        """
+        found = {}
+        for path in self.folder.glob(f"*/{self.first}"):
+            with contextlib.suppress(OSError):  # deleted by another request
+                if NAME.fullmatch(path.parent.name) and path.is_file():
+                    found[path.parent.name] = path.stat().st_mtime
+        return dict(sorted(found.items(), key=lambda one: -one[1]))
 
     def folders(self, name: str) -> list[Path]:
         """Folders of which a result consists."""
@@ -76,15 +83,6 @@ class ResultStore:
             return bool(self.request(name)) and self.result(name) is not None
         except (Missing, RunError):
             return False
-
-    def _newest_first(self, pattern: str) -> list[Path]:
-        """Files below the folder by the pattern, whose parents have a valid name."""
-        paths = [
-            path
-            for path in self.folder.glob(pattern)
-            if NAME.fullmatch(path.parent.name) and path.is_file()
-        ]
-        return sorted(paths, key=lambda path: path.stat().st_mtime, reverse=True)
 
     def _object(self, name: str, file: str) -> dict[str, Any]:
         return read_object(self.folder / name / file, self.kind, name)

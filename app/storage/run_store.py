@@ -16,7 +16,7 @@ from palpate.app.storage.result_store import NAME, ResultStore, read_object, unu
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 
-__all__ = ["CORRECTIONS", "RecordedReplay", "Run", "RunStore"]
+__all__ = ["CORRECTIONS", "EXPORTS", "RecordedReplay", "Run", "RunStore"]
 
 FIELDS = (
     "time",
@@ -43,6 +43,8 @@ FIELDS = (
 """Arrays that every file of a replay has."""
 CORRECTIONS = "corrections"
 """Folder beside the runs: the recorded frames of each run, corrected by a trained network."""
+EXPORTS = "exports"
+"""Folder beside the runs in which exported files lie, a folder for each job."""
 CORRECTED = (
     "corrected",
     "error_corrected",

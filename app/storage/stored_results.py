@@ -76,5 +76,8 @@ class StoredResults:
         for folder in store.folders(name):
             if folder.is_dir():
                 aside = folder.with_name(f".deleted-{uuid4().hex}")
-                os.rename(folder, aside)
+                try:
+                    os.rename(folder, aside)
+                except FileNotFoundError:  # another request has deleted it
+                    raise store.missing(name) from None
                 shutil.rmtree(aside, ignore_errors=True)

@@ -23,6 +23,7 @@ from palpate.correction.samples.sample_splits import Split
 from palpate.correction.samples.sample_store import Samples
 from palpate.correction.trained_network import TrainedNetwork
 from palpate.correction.training_spec import TrainingSpec
+from palpate.dataset.provenance import software_of
 from palpate.foundation.arrays import IntArray
 from palpate.foundation.errors import CorrectionError, RunError
 from palpate.foundation.progress import Report
@@ -154,7 +155,7 @@ class TrainingRun:
         }
         about = {
             **known,
-            "made_from": self.samples.about.get("made_from", {}),
+            "made_from": self._made_from(),
             "split": {key: list(names) for key, names in asdict(self.split).items()},
             "training": self.spec.to_json(),
             "error": self.progress.best,
@@ -163,6 +164,16 @@ class TrainingRun:
             "history": self.progress.history,
         }
         return TrainedNetwork(self.network.eval(), self.body, about)
+
+    def _made_from(self) -> dict[str, Any]:
+        """The data and code of the samples, and the code and seed of this training."""
+        samples = self.samples.about.get("made_from", {})
+        return {
+            **software_of(),
+            "data": samples.get("data"),
+            "seed": self.spec.seed,
+            "samples": samples,
+        }
 
     def _step(self, rows: IntArray) -> None:
         batch = self.samples.batch(rows).to(self.device)

@@ -97,7 +97,10 @@ class AcceptedRegistration:
 def rest_digest(folder: Path) -> str:
     """Digest of the rest cloud's file; empty without one."""
     file = folder / "rest.ply"
-    return hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
+    if not file.is_file():
+        return ""
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
 
 
 def _array(values: Any, shape: tuple[int, ...]) -> FloatArray:

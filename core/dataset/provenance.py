@@ -14,7 +14,14 @@ from typing import Any
 from palpate.foundation.errors import DatasetError, RunError
 from palpate.foundation.source_digest import source_digest
 
-__all__ = ["check_data", "check_unchanged", "data_changed", "dataset_digest", "made_from"]
+__all__ = [
+    "check_data",
+    "check_unchanged",
+    "data_changed",
+    "dataset_digest",
+    "made_from",
+    "software_of",
+]
 
 _WHOLE, _BLOCK, _BLOCKS = 2**18, 2**16, 4
 """Bytes up to which a file is read whole; bytes of a block, and number of blocks, of a larger."""
@@ -60,7 +67,7 @@ def made_from(folder: Path) -> dict[str, Any]:
     `data` is its `dataset_digest`, `version` that of Palpate, `code` the digest of the sources, and
     `commit` that of the checkout, with "-dirty" for changed files; None outside of one.
     """
-    return {"data": dataset_digest(folder), **_software()}
+    return {"data": dataset_digest(folder), **software_of()}
 
 
 def check_data(stored: Mapping[str, Any], now: Mapping[str, Any], kind: str, name: str) -> None:
@@ -150,12 +157,13 @@ def _digest_by_stamp(folder: Path, stamp: str) -> str:
 
 
 @cache
-def _software() -> dict[str, str | None]:
+def software_of() -> dict[str, str | None]:
+    """Version, commit and digest of the sources of this Palpate, as in `made_from`."""
     try:
         number = version("palpate")
     except PackageNotFoundError:
         number = "unknown"
-    return {"version": number, "commit": _commit(), "code": source_digest()}
+    return {"version": number, "commit": _commit(), "code": source_digest(excluded=())}
 
 
 def _commit() -> str | None:

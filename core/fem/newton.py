@@ -58,6 +58,20 @@ class Outcome(Enum):
         "look at its first frame without equilibrium"
     )
 
+    @property
+    def code(self) -> int:
+        """Number in recordings: 0 for `CONVERGED`; 1 is not used, since old recordings have it for
+        all others.
+        """
+        number = list(Outcome).index(self)
+        return number + 1 if number else 0
+
+    @staticmethod
+    def reason(code: int) -> str:
+        """The sentence of a recorded number that is not 0."""
+        known = {one.code: one.value for one in Outcome}
+        return known.get(code, "no equilibrium; the reason was not recorded")
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:

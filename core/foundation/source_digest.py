@@ -22,13 +22,13 @@ EXCLUDED = (
 
 
 @cache
-def source_digest(*folders: str) -> str:
+def source_digest(*folders: str, excluded: tuple[str, ...] = EXCLUDED) -> str:
     """Compute the digest (12 hex digits) of all sources that a diagnosis or a virtual dataset uses.
-
-    The folders in `EXCLUDED` are left out: they may change without making old results invalid.
 
     Args:
         folders: only these folders of `core` count; all without any.
+        excluded: folders and files that do not count; the usual ones may change without making
+            old diagnoses and datasets invalid.
     """
     root = Path(__file__).parent.parent
     digest = hashlib.sha256()
@@ -36,6 +36,6 @@ def source_digest(*folders: str) -> str:
         name = path.relative_to(root).as_posix()
         if folders and not name.startswith(tuple(f"{folder}/" for folder in folders)):
             continue
-        if not any(name == user or name.startswith(f"{user}/") for user in EXCLUDED):
+        if not any(name == user or name.startswith(f"{user}/") for user in excluded):
             digest.update(f"{name}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:12]

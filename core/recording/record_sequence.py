@@ -14,7 +14,6 @@ import numpy as np
 
 from palpate.dataset import Sequence as Recording
 from palpate.dataset.tool_smoothing import smooth_centres
-from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
@@ -129,9 +128,7 @@ def compare_with_clouds(
         np.array(errors),
         np.array(distance),
         np.array(paper),
-        np.array(
-            [0 if frame.outcome is Outcome.CONVERGED else 1 for frame in frames], dtype=np.int8
-        ),
+        np.array([frame.outcome.code for frame in frames], dtype=np.int8),
         np.array([not frame.in_contact for frame in frames]),
         np.array([np.linalg.norm(frame.force) for frame in frames]),
         np.array([frame.iterations for frame in frames], dtype=np.int32),

@@ -79,7 +79,7 @@ def run_sweep(
             ReplayCache(store),
             ResultRows(folder / "points.jsonl"),
             part(report, 0.05, 1.0),
-            {"data": made["data"], "code": made["code"]},
+            {**made, "seed": request.seed},
         )
         summary = {**run.run(), "made_from": {**made, "seed": request.seed}}
         check_unchanged(dataset.path, made)
@@ -116,7 +116,7 @@ class _SweepRun:
 
     Attributes:
         points: the rows of all points so far.
-        made: digests of the data and of the code, which every row states.
+        made: digests of data and code, version, commit and seed, which every row states.
         sums: sums (p, 4) over the pushes of all sequences, by the number of each solved point.
         old: rows of an earlier, interrupted run by number.
         computed: number of replays that were not in the cache.
@@ -133,7 +133,7 @@ class _SweepRun:
         store: ReplayCache,
         rows: ResultRows,
         report: Report,
-        made: dict[str, str],
+        made: dict[str, Any],
     ) -> None:
         self.request, self.stated, self.data, self.grid = request, stated, data, grid
         self.executor, self.store, self.rows, self.report = executor, store, rows, report

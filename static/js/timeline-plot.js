@@ -125,8 +125,11 @@ export function frameSummary(series, frame) {
   );
   const failed = Object.entries(series.failed ?? {})
     .filter(([, frames]) => frames?.includes(frame))
-    .map(([name]) => name);
-  return failed.length ? [...lines, `no equilibrium: ${failed.join(", ")}`] : lines;
+    .map(([name, frames]) => {
+      const reason = series.reasons?.[/** @type {Model} */ (name)]?.[frames.indexOf(frame)];
+      return `no equilibrium of the ${name} model${reason ? `: ${reason}` : ""}`;
+    });
+  return [...lines, ...failed];
 }
 
 /**

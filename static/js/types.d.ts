@@ -82,6 +82,8 @@ export interface Series {
   forces: Partial<Record<Model, FrameValues>> | null;
   iterations: Partial<Record<Model, number[]>> | null;
   failed?: Partial<Record<Model, number[]>>;
+  /** Why a model found no equilibrium, for each of its failed frames. */
+  reasons?: Partial<Record<Model, string[]>>;
   worst: number[];
   limits: Record<Quantity, number | null>;
   /** Why the run holds no fields inside the block; null where it does. */

@@ -14,6 +14,7 @@ from palpate.app.reporting.timeline_series import (
     worst_frames,
 )
 from palpate.app.storage.run_store import RecordedReplay, Run
+from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 
 
@@ -101,11 +102,14 @@ def test_forces_and_failures_of_each_model_are_told_where_recorded(
     kept = moved(
         replay,
         force_raw=np.arange(5) / 10,
-        outcome_raw=np.array([0, 0, 1, 0, 2]),
+        outcome_raw=np.array([0, 0, 1, 0, Outcome.GIVEN_UP.code]),
         outcome_extended=np.zeros(5),
     )
     assert timeline_series(run, kept)["forces"] == {"raw": [0.0, 0.1, 0.2, 0.3, 0.4]}
-    assert timeline_series(run, kept)["failed"] == {"raw": [2, 4], "extended": []}
+    told = timeline_series(run, kept)
+    assert told["failed"] == {"raw": [2, 4], "extended": []}
+    assert told["reasons"]["raw"][0].endswith("the reason was not recorded")
+    assert told["reasons"]["raw"][1].startswith("the push was given up")
 
 
 def test_series_of_a_third_model_and_iterations_are_told_where_recorded(

@@ -125,6 +125,18 @@ def test_head_whose_bytes_drip_has_one_limit(client: httpx.Client) -> None:
         assert time.monotonic() - begun < 12.0
 
 
+def test_body_whose_bytes_drip_has_a_limit(client: httpx.Client) -> None:
+    url, begun = client.base_url, time.monotonic()
+    head = f"POST /api/imports?name=drip HTTP/1.1\r\nhost: {url.host}:{url.port}\r\n"
+    with socket.create_connection((url.host, url.port or 80), timeout=20) as line:
+        line.sendall(f"{head}content-length: 100000\r\n\r\n".encode())
+        with pytest.raises(OSError):
+            for _ in range(60):
+                line.sendall(b"x")
+                time.sleep(0.25)
+    assert 4.0 < time.monotonic() - begun < 12.0
+
+
 def test_websocket_that_says_nothing_and_a_slow_answer_stay(client: httpx.Client) -> None:
     url = client.base_url
     address = f"ws://{url.host}:{url.port}/api/sessions/page-00000000/socket"
