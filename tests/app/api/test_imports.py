@@ -202,3 +202,26 @@ def test_an_archive_that_waits_is_not_deleted_for_room(tmp_path: Path) -> None:
     ]
     assert "oldest caches" in _tidy(Disk(tmp_path, 0), jobs)
     assert [file.exists() for file in files] == [True, True, False]
+
+
+def test_upload_outlives_the_emptying_of_caches(client: httpx.Client, tmp_path: Path) -> None:
+    content = packed(write_valid_dataset(tmp_path / "block"))
+
+    def parts() -> Iterator[bytes]:
+        yield content[:2000]
+        httpx.post(f"{client.base_url}/api/disk/empty").raise_for_status()
+        yield content[2000:]
+
+    answer = client.post("/api/imports?name=emptied", content=parts())
+    assert answer.status_code == 202, answer.text
+
+
+def test_archive_that_no_import_takes_is_deleted(
+    client: httpx.Client, shared_place: Any, tmp_path: Path
+) -> None:
+    key = {"idempotency-key": "taken-by-another"}
+    client.post("/api/diagnoses", json={"dataset": "small"}, headers=key).raise_for_status()
+    content = packed(write_valid_dataset(tmp_path / "block"))
+    answer = client.post("/api/imports?name=unwanted", content=content, headers=key)
+    assert answer.status_code == 409
+    assert not list(shared_place.runs.glob("uploads/*unwanted*"))

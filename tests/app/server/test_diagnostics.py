@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -10,9 +12,11 @@ from pathlib import Path
 import httpx
 import pytest
 from job_functions import TARGETS, ended
+from typer.testing import CliRunner
 
+from palpate.app.cli import app as cli
 from palpate.app.jobs.job_queue import JobQueue
-from palpate.app.server.diagnostics import LOG, diagnostics, write_log
+from palpate.app.server.diagnostics import LOG, diagnostics, note_settings, write_log
 from palpate.app.settings import Settings
 
 
@@ -65,3 +69,28 @@ def test_the_page_gets_it_as_a_file(client: httpx.Client) -> None:
     answer = client.get("/api/diagnostics").raise_for_status()
     assert "palpate-diagnostics.txt" in answer.headers["content-disposition"]
     assert answer.text.startswith("Palpate diagnostics, ")
+
+
+def test_doctor_prints_the_settings_of_the_server(tmp_path: Path) -> None:
+    note_settings(tmp_path, Settings(workers=7).model_dump(mode="json"))
+    printed = CliRunner().invoke(cli, ["doctor", "--runs", str(tmp_path)])
+    assert printed.exit_code == 0 and "workers = 7" in printed.stdout
+    printed = CliRunner().invoke(cli, ["doctor", "--runs", str(tmp_path / "none")])
+    assert "no server was started with these runs" in printed.stdout
+
+
+def test_rows_of_a_dataset_that_an_error_names_are_left_out(tmp_path: Path) -> None:
+    with closing(JobQueue(tmp_path, TARGETS)) as jobs:
+        job = jobs.submit("stumble", {}, label="block")
+        where = {
+            "kind": "DatasetError",
+            "message": "a row is bad",
+            "where": {"value": "1.2345,6.7"},
+        }
+        ended(jobs, job)
+        database = sqlite3.connect(tmp_path / "jobs.sqlite")
+        with database:
+            database.execute("update jobs set error = ?", [json.dumps(error)])
+        database.close()
+        text = diagnostics(tmp_path, {})
+    assert "DatasetError: a row is bad" in text and "1.2345" not in text

@@ -7,6 +7,7 @@ import io
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tarfile
@@ -219,6 +220,17 @@ def test_inner_port_of_the_scene_refuses_strangers(
         for port in inner:
             with pytest.raises(websockets.InvalidStatus, match="403"):
                 connect(f"ws://127.0.0.1:{port}/", subprotocols=spoken, proxy=None)
+
+
+def test_server_that_cannot_keep_jobs_tells_no_address(
+    server: tuple[subprocess.Popen[str], httpx.Client], place: Path, tmp_path: Path
+) -> None:
+    second = printed("serve", "--port", "0", "--runs", str(place / "runs"))
+    assert "another server works in" in second and "http://" not in second
+    with sqlite3.connect(tmp_path / "jobs.sqlite") as database:
+        database.execute("pragma user_version = 99")
+    later = printed("serve", "--port", "0", "--runs", str(tmp_path))
+    assert "http://" not in later and "Traceback" not in later and "version" in later
 
 
 def test_jobs_of_one_second_have_an_id_each(tmp_path: Path, sent: bytes) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import sqlite3
@@ -12,6 +13,11 @@ from pathlib import Path
 import job_functions
 import pytest
 from launched_server import client_of, launched, until
+
+from palpate.app.main import create_app
+from palpate.app.server.serve import serve
+from palpate.app.settings import Settings
+from palpate.foundation.errors import SetupError
 
 
 def fork_servers(pid: int) -> list[int]:
@@ -53,3 +59,16 @@ def test_server_whose_jobs_cannot_start_ends_with_a_status_and_keeps_them(tmp_pa
         assert "the job queue gives up: no process could be started" in process.stderr.read()
     with launched(tmp_path), client_of(tmp_path) as client:
         until(lambda: client.get("/api/jobs/waits").json()["state"] == "done")
+
+
+def test_full_disk_at_the_start_is_told_before_any_address(tmp_path: Path) -> None:
+    app = create_app(Settings(runs=tmp_path), job_functions.TARGETS)
+
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    app.state.prepare = full
+    told: list[str] = []
+    with pytest.raises(SetupError, match="its disk is full"):
+        serve(app, "127.0.0.1", 0, told.append)
+    assert not told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from palpate.app.http_errors import Missing
 from palpate.app.settings import Settings
+from palpate.app.storage.disk_usage import Disk
 from palpate.app.storage.stored_results import StoredResults
 
 
@@ -89,3 +91,28 @@ def test_what_is_at_work_is_not_deleted(tmp_path: Path, serve: Any, shared_place
         job = client.post("/api/sweeps", json=asked).json()["id"]
         assert client.delete(f"/api/disk/sweep/{job}").status_code == 409
         client.post(f"/api/sweeps/{job}/cancel")
+
+
+def test_results_are_listed_while_others_are_deleted(
+    tmp_path: Path, serve: Any, shared_place: Any
+) -> None:
+    settings = Settings(runs=tmp_path, datasets=shared_place.settings.datasets, preload=())
+    names = [f"run-{number}" for number in range(60)]
+    for name in names:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "report.json").write_text("{}")
+    with serve(settings) as client, ThreadPoolExecutor(6) as others:
+        paths = ["/api/runs", "/api/disk"] * 30
+        asked = [others.submit(client.get, path) for path in paths]
+        asked += [
+            others.submit(client.delete, f"/api/disk/run/{name}") for name in names for _ in (0, 1)
+        ]
+        codes = {one.result().status_code for one in asked}
+    assert codes <= {200, 404} and not list(tmp_path.glob("run-*"))
+
+
+def test_exports_are_deleted_for_room_like_other_caches(tmp_path: Path) -> None:
+    export = tmp_path / "exports" / "export-block-1" / "report.json"
+    export.parent.mkdir(parents=True)
+    export.write_bytes(b"x" * 1000)
+    assert Disk(tmp_path, 500).trim().dropped == 1000 and not export.exists()
