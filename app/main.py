@@ -111,6 +111,19 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
     app.include_router(login_router)
     _answer_problems(app)
 
+    _add_health(app, settings)
+
+    @app.get("/", include_in_schema=False)
+    async def page() -> FileResponse:
+        return FileResponse(settings.static / "index.html", headers={"cache-control": "no-cache"})
+
+    app.mount("/static", StaticFiles(directory=settings.static), name="static")
+    return app
+
+
+def _add_health(app: FastAPI, settings: Settings) -> None:
+    """Add what tells whether the server works, and the text for the report of a fault."""
+
     @app.get("/health", tags=["health"], responses={503: {"model": Health}})
     async def health(response: Response) -> Health:
         """200 where all works, 503 where the job queue does not; the page shows the reason."""
@@ -132,13 +145,6 @@ def create_app(settings: Settings, targets: Mapping[str, str] = TARGETS) -> Fast
         text = diagnostics(settings.runs, settings.model_dump(mode="json"))
         headers = {"content-disposition": 'attachment; filename="palpate-diagnostics.txt"'}
         return Response(text, media_type="text/plain", headers=headers)
-
-    @app.get("/", include_in_schema=False)
-    async def page() -> FileResponse:
-        return FileResponse(settings.static / "index.html", headers={"cache-control": "no-cache"})
-
-    app.mount("/static", StaticFiles(directory=settings.static), name="static")
-    return app
 
 
 def _fail(app: FastAPI, reason: str) -> None:

@@ -44,6 +44,12 @@ def check(
     picture: Annotated[
         Path | None, typer.Option(help="Write a picture of the touched places (one dataset only).")
     ] = None,
+    digest: Annotated[
+        bool,
+        typer.Option(
+            "--digest", help="Also print the digests: of samples, as in results, and of all bytes."
+        ),
+    ] = False,
 ) -> None:
     """Read everything in a dataset and print its content, warnings, and what it cannot show."""
     if picture is not None and len(datasets) != 1:
@@ -54,6 +60,8 @@ def check(
     for path in datasets:
         try:
             _check_one(path, picture)
+            if digest:
+                _print_digests(path)
         except PalpateError as error:
             broken += 1
             print_problem(error, f" in {path}")
@@ -229,6 +237,12 @@ def _check_one(path: Path, picture: Path | None) -> None:
 
         coverage_picture(dataset, registration.phantom_from_robot, picture)
         out.print(f"coverage: {picture}", highlight=False)
+
+
+def _print_digests(path: Path) -> None:
+    from palpate.dataset.provenance import dataset_digest
+
+    out.print(f"digest {dataset_digest(path)}, of all bytes {dataset_digest(path, full=True)}")
 
 
 def _print_summary(

@@ -12,7 +12,7 @@ from palpate.app.storage.archive import copy_folder, dataset_root, unpack
 from palpate.app.storage.dataset_import import STAGING, check_name
 from palpate.app.storage.held_folder import held_folder
 from palpate.foundation.errors import DatasetError
-from palpate.foundation.processes import limited_memory
+from palpate.foundation.processes import TimeUsedError, limited_memory, limited_time
 from palpate.foundation.progress import Report, part
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["import_dataset"]
 
-_MEMORY = 2**29
-"""Address space that the import of a dataset may take [bytes]."""
+_MEMORY, _TIME = 2**29, 3600
+"""Address space [bytes] and processor time [s] that the import of a dataset may take."""
 
 
 def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
@@ -44,7 +44,8 @@ def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
                 "write there, or start it with another folder of datasets",
                 key="datasets",
             ) from error
-        opened = _imported(request, aside, datasets / name, report)
+        with limited_time(_TIME):
+            opened = _imported(request, aside, datasets / name, report)
     return {
         "dataset": name,
         "sequences": len(opened.sequences),
@@ -67,15 +68,17 @@ def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report)
             importlib.import_module("open3d")
         with limited_memory(_MEMORY):
             refuse_problems(root, part(report, 0.4, 1.0))
-    except (DatasetError, MemoryError) as error:
+    except (DatasetError, MemoryError, TimeUsedError) as error:
         if archive is not None:
             archive.unlink(missing_ok=True)
         if isinstance(error, DatasetError):
             raise
-        raise DatasetError(
-            f"its files take more than {_MEMORY // 2**20} MiB of memory to read: check what was "
-            "exported"
-        ) from None
+        what = (
+            f"more than {_MEMORY // 2**20} MiB of memory"
+            if isinstance(error, MemoryError)
+            else f"more than {_TIME // 60} minutes of processor time"
+        )
+        raise DatasetError(f"its files take {what} to read: check what was exported") from None
     opened = open_dataset(root)
     check_name(whole.name, whole.parent)
     try:

@@ -109,14 +109,14 @@ def _jobs(path: Path) -> Iterator[str]:
         yield f"cannot be read: {error}"
         return
     try:
-        for identity, *rest, error in database.execute(
+        for identity, *rest, stored in database.execute(
             "select id, kind, state, attempt, fraction, error from jobs "
             "order by rowid desc limit ?",
             [_JOBS],
         ).fetchall():
             yield f"{identity}: " + ", ".join(str(value) for value in rest if value is not None)
-            if error is not None:
-                yield f"    {_told(error)}"
+            if stored is not None:
+                yield f"    {_told(stored)}"
             notes = database.execute(
                 "select level, text from log where job = ? order by rowid desc limit ?",
                 [identity, _NOTES],
@@ -128,11 +128,11 @@ def _jobs(path: Path) -> Iterator[str]:
         database.close()
 
 
-def _told(error: str) -> str:
+def _told(stored: str) -> str:
     """Kind and message of a stored error, without the values of its place."""
     try:
-        stored = json.loads(error)
-        return f"{stored['kind']}: {stored['message']}"
+        error = json.loads(stored)
+        return f"{error['kind']}: {error['message']}"
     except (ValueError, KeyError, TypeError):
         return "an error that cannot be read"
 

@@ -32,6 +32,8 @@ class ImpatientProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Take data, and wait for what the request lacks."""
+        if self.conn.their_state is h11.IDLE:  # a request begins
+            self._begun, self._received = self.loop.time(), 0
         self._received += len(data)
         super().data_received(data)
         self._wait()
@@ -49,13 +51,10 @@ class ImpatientProtocol(H11Protocol):
         if self._in_head and was_in_head and self._timer is not None:
             return  # the whole head has one limit, however its bytes drip
         self._stop()
-        now = self.loop.time()
-        if self._in_head or was_in_head:
-            self._begun, self._received = now, 0
         if self._in_head:
             self._timer = self.loop.call_later(HEAD, self._close)
         elif self.conn.their_state is h11.SEND_BODY:
-            left = self._begun + PAUSE + self._received / SLOWEST - now
+            left = self._begun + PAUSE + self._received / SLOWEST - self.loop.time()
             self._timer = self.loop.call_later(max(0.0, min(PAUSE, left)), self._close)
 
     def _stop(self) -> None:

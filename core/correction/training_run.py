@@ -155,7 +155,7 @@ class TrainingRun:
         }
         about = {
             **known,
-            "made_from": self._made_from(),
+            "made_from": _made_from(self.samples, self.spec),
             "split": {key: list(names) for key, names in asdict(self.split).items()},
             "training": self.spec.to_json(),
             "error": self.progress.best,
@@ -164,16 +164,6 @@ class TrainingRun:
             "history": self.progress.history,
         }
         return TrainedNetwork(self.network.eval(), self.body, about)
-
-    def _made_from(self) -> dict[str, Any]:
-        """The data and code of the samples, and the code and seed of this training."""
-        samples = self.samples.about.get("made_from", {})
-        return {
-            **software_of(),
-            "data": samples.get("data"),
-            "seed": self.spec.seed,
-            "samples": samples,
-        }
 
     def _step(self, rows: IntArray) -> None:
         batch = self.samples.batch(rows).to(self.device)
@@ -343,3 +333,9 @@ def _input_scales(samples: Samples, rows: IntArray, body: Body) -> tuple[float, 
         counts += torch.tensor([part.numel() for part in parts])
     velocity, force, displacement = (squares / counts).sqrt().tolist()
     return velocity, force, displacement
+
+
+def _made_from(samples: Samples, spec: TrainingSpec) -> dict[str, Any]:
+    """The data and code of the samples, and the code and seed of this training."""
+    made = samples.about.get("made_from", {})
+    return {**software_of(), "data": made.get("data"), "seed": spec.seed, "samples": made}

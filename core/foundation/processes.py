@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing import get_context, parent_process
@@ -14,7 +16,15 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar
 
-__all__ = ["ProcessPool", "at_once", "giving_memory_back", "keeping_memory", "limited_memory"]
+__all__ = [
+    "ProcessPool",
+    "TimeUsedError",
+    "at_once",
+    "giving_memory_back",
+    "keeping_memory",
+    "limited_memory",
+    "limited_time",
+]
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _KEPT, _LARGE = -1, -3, 1 << 27, 1 << 25
@@ -140,6 +150,30 @@ def limited_memory(more: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+class TimeUsedError(Exception):
+    """A block has used the processor time that it may."""
+
+
+@contextlib.contextmanager
+def limited_time(seconds: int) -> Iterator[None]:
+    """Raise TimeUsedError in the block once this process has used so much processor time in it; for
+    the main thread.
+    """
+    import resource
+
+    def end(*_: object) -> None:
+        raise TimeUsedError(f"{seconds} s of processor time are used")
+
+    used, before = math.ceil(time.process_time()), resource.getrlimit(resource.RLIMIT_CPU)
+    handler = signal.signal(signal.SIGXCPU, end)
+    resource.setrlimit(resource.RLIMIT_CPU, (used + seconds, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, before)
+        signal.signal(signal.SIGXCPU, handler)
 
 
 def giving_memory_back() -> None:

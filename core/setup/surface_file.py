@@ -14,6 +14,8 @@ from palpate.foundation.errors import MeshError
 __all__ = ["FORMATS", "check_surface", "read_surface"]
 
 FORMATS = (".stl", ".ply", ".obj")
+LARGEST_FILE = 2**25
+"""Bytes of a surface's file: 600 000 triangles in a binary STL. Reading takes 16 times as much."""
 _SMALLEST, _LARGEST = 1e-3, 2.0
 """Smallest and largest extent of a phantom along any axis [m]: as for a block."""
 
@@ -37,6 +39,15 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
         raise MeshError(
             f"{path.name}: there is no such file in {path.parent}; expected a surface there",
             file=str(path),
+        )
+    size = path.stat().st_size
+    if size > LARGEST_FILE:
+        raise MeshError(
+            f"{path.name}: has {size / 2**20:.0f} MiB, at most {LARGEST_FILE / 2**20:.0f} are "
+            "read: decimate it; meshes for simulation need less than 100 000 triangles",
+            file=str(path),
+            value=size,
+            high=LARGEST_FILE,
         )
     import trimesh
 

@@ -2,7 +2,7 @@
 // noise floor, push depth, force, solver iterations.
 import { formatMm } from "./format.js";
 
-/** @import { FrameValues, Series } from "./types.js" */
+/** @import { FrameValues, Model, Series } from "./types.js" */
 
 /**
  * A lane: its share of the height, its curves with their colours, and how a value is written.

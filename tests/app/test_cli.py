@@ -22,6 +22,7 @@ from palpate.app.commands import console
 from palpate.app.commands.console import agrees, progress, verdict_cells, verdict_table, write_json
 from palpate.app.commands.diagnosis import print_report
 from palpate.app.jobs.signals import Stop
+from palpate.dataset.provenance import dataset_digest
 from palpate.foundation.errors import Cancelled
 from palpate.foundation.quantities import parameters_text
 
@@ -96,6 +97,13 @@ def test_check_goes_on_after_a_broken_dataset_and_says_so_in_the_end(
     assert "small-block" in out
     assert "poke-01" in out
     assert "forces in 1 of 2 sequences, so that Young's modulus can be found" in out
+
+
+def test_check_prints_the_digests_on_demand(palpate: Palpate, dataset: Path) -> None:
+    code, out, _ = palpate("check", dataset, "--digest")
+    assert code == 0
+    assert f"digest {dataset_digest(dataset)}, of all bytes" in out
+    assert dataset_digest(dataset, full=True) in out
 
 
 def test_two_datasets_of_one_name_are_refused_before_any_computing(

@@ -63,3 +63,11 @@ def _is_known(name: str) -> bool:
         return hasattr(importlib.import_module(module), attribute)
     except ModuleNotFoundError:
         return False
+
+
+def test_scripts_in_pages_are_included_and_there() -> None:
+    lines = [line for text in TEXTS for line in text.read_text().split("\n") if "--8" in line]
+    assert len(lines) >= 4
+    for line in lines:
+        included = re.fullmatch(r'--8<-- "(\S+)"', line)
+        assert included and (ROOT / included[1]).is_file(), line

@@ -200,7 +200,7 @@ def test_an_archive_that_waits_is_not_deleted_for_room(tmp_path: Path) -> None:
         Job(id=file.name, kind="import", request={"archive": str(file)}, state=state)
         for file, state in zip(files, states, strict=True)
     ]
-    assert "oldest caches" in _tidy(Disk(tmp_path, 0), jobs)
+    assert "oldest caches" in _tidy(Disk(tmp_path, 0), jobs, [])
     assert [file.exists() for file in files] == [True, True, False]
 
 

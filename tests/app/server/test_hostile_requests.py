@@ -137,6 +137,20 @@ def test_body_whose_bytes_drip_has_a_limit(client: httpx.Client) -> None:
     assert 4.0 < time.monotonic() - begun < 12.0
 
 
+def test_body_of_a_later_request_of_a_connection_has_its_own_limit(client: httpx.Client) -> None:
+    url = client.base_url
+    head = (
+        f"POST /api/disk/empty HTTP/1.1\r\nhost: {url.host}:{url.port}\r\ncontent-length: 2\r\n\r\n"
+    )
+    with socket.create_connection((url.host, url.port or 80), timeout=20) as line:
+        for pause in (0.0, 4.0, 4.0):  # beyond the limit of one request in all
+            time.sleep(pause)
+            line.sendall(head.encode())
+            time.sleep(0.2)
+            line.sendall(b"{}")
+            assert line.recv(4096).startswith(b"HTTP/1.1 200")
+
+
 def test_websocket_that_says_nothing_and_a_slow_answer_stay(client: httpx.Client) -> None:
     url = client.base_url
     address = f"ws://{url.host}:{url.port}/api/sessions/page-00000000/socket"

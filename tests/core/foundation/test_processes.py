@@ -13,7 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.foundation.processes import ProcessPool, giving_memory_back, limited_memory
+from palpate.foundation.processes import (
+    ProcessPool,
+    TimeUsedError,
+    giving_memory_back,
+    limited_memory,
+    limited_time,
+)
 
 OWNER = """
 import sys, time
@@ -123,3 +129,12 @@ def test_memory_beyond_a_limit_is_refused_in_the_block_alone() -> None:
             np.ones(2**27)
         assert np.ones(2**20).sum() == 2**20
     assert np.ones(2**27)[-1] == 1.0
+
+
+def test_processor_time_beyond_a_limit_ends_the_block() -> None:
+    with pytest.raises(TimeUsedError, match="1 s of processor time"), limited_time(1):
+        while True:
+            sum(range(1000))
+    end = time.process_time() + 0.1
+    while time.process_time() < end:  # and nothing after it
+        sum(range(1000))

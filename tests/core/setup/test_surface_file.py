@@ -41,6 +41,14 @@ def test_texture_of_a_surface_is_not_read(tmp_path, monkeypatch):
     assert len(shape.vertices) == 8 and not opened
 
 
+def test_file_that_is_too_large_is_not_read(tmp_path):
+    path = tmp_path / "organ.stl"
+    with path.open("wb") as file:
+        file.truncate(2**25 + 1)
+    with pytest.raises(MeshError, match="has 32 MiB, at most 32 are read: decimate it"):
+        load_shape(path)
+
+
 def test_hole_is_reported_with_its_open_edges_and_place(tmp_path):
     vertices, triangles = box_surface(SIZE)
     top = (vertices[triangles, 2] > 0.02).all(axis=1)
