@@ -37,6 +37,11 @@ class Box(Geometry):
         """Highest corner (3,) [m]."""
         return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
 
+    @property
+    def volume(self) -> float:
+        """Volume [m^3]."""
+        return float(np.prod(self.size))
+
     def nearest(self, points: FloatArray) -> FloatArray:
         """Points of the block (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where
         they are.

@@ -40,6 +40,11 @@ class Geometry(ABC):
         """Height of the highest point [m]."""
         return float(self.high[2])
 
+    @property
+    @abstractmethod
+    def volume(self) -> float:
+        """Enclosed volume [m^3]."""
+
     @abstractmethod
     def nearest(self, points: FloatArray) -> FloatArray:
         """Points of the body (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where they

@@ -16,7 +16,6 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, part, silent
 from palpate.setup.depth_filters import DEPTH_FILTERS
-from palpate.setup.shape import Shape
 
 __all__ = ["ClockSummary", "DatasetSummary", "SequenceSummary", "check_dataset"]
 
@@ -186,8 +185,9 @@ def _doubts(dataset: Dataset) -> list[str]:
         doubts.append(
             "no sequence is kept for the test, so no gain can be shown: name one in splits.test"
         )
-    shape = dataset.geometry if isinstance(dataset.geometry, Shape) else None
-    doubts += [f"dataset.toml: {text}" for text in implausible_values(dataset.config, shape)]
+    doubts += [
+        f"dataset.toml: {text}" for text in implausible_values(dataset.config, dataset.geometry)
+    ]
     doubts += [
         f"dataset.toml: camera.filters names {name}: {DEPTH_FILTERS[name].caution}"
         for name in dataset.config.camera_filters

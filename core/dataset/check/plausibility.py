@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from palpate.dataset.schema import DatasetConfig
-from palpate.setup.shape import Shape
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["implausible_values"]
 
@@ -22,16 +20,16 @@ DEEPEST = 0.8
 support before it dents the phantom as it dents a thick one."""
 
 
-def implausible_values(config: DatasetConfig, shape: Shape | None = None) -> list[str]:
+def implausible_values(config: DatasetConfig, body: Geometry) -> list[str]:
     """Return a sentence with the value, its bound and the reason for each implausible value.
 
     Args:
         config: of the dataset.
-        shape: of the phantom; None for a box.
+        body: the phantom.
     """
-    volume = shape.volume if shape is not None else float(np.prod(config.size))
-    density, modulus = config.mass / volume, config.young_modulus
-    smallest, diameter = min(config.size), 2 * config.tool_radius
+    volume, modulus = body.volume, config.young_modulus
+    density = config.mass / volume
+    smallest, diameter = min(body.size), 2 * config.tool_radius
     doubts = []
     if not DENSITY[0] <= density <= DENSITY[1]:
         doubts.append(

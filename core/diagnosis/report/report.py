@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import beta
 
 from palpate.dataset import Dataset
+from palpate.dataset.check.plausibility import implausible_values
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
@@ -202,7 +203,10 @@ def report_of(
         "gain": None if gain is None else gain.to_json(split),
         "ambiguity_map": [one.to_json() for one in findings.identifiability],
         "evidence": _evidence(evaluator, findings, checks),
-        "warnings": _warnings(evaluator, findings, checks),
+        "warnings": [
+            *implausible_values(dataset.config, dataset.geometry),
+            *_warnings(evaluator, findings, checks),
+        ],
     }
 
 

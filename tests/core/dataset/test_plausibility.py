@@ -14,6 +14,7 @@ from palpate.dataset import open_dataset
 from palpate.dataset.check import check_dataset
 from palpate.dataset.check.plausibility import implausible_values
 from palpate.dataset.schema import DatasetConfig
+from palpate.setup.box import Box
 
 
 @pytest.fixture
@@ -22,7 +23,7 @@ def config(tmp_path: Path) -> DatasetConfig:
 
 
 def test_a_usual_phantom_raises_no_doubt(config: DatasetConfig) -> None:
-    assert implausible_values(config) == []
+    assert implausible_values(config, Box(size=config.size)) == []
 
 
 @pytest.mark.parametrize(
@@ -39,7 +40,7 @@ def test_a_usual_phantom_raises_no_doubt(config: DatasetConfig) -> None:
 def test_an_implausible_value_is_told_with_its_bound(
     config: DatasetConfig, values: dict[str, Any], told: str
 ) -> None:
-    (text,) = implausible_values(replace(config, **values))
+    (text,) = implausible_values(replace(config, **values), Box(size=config.size))
     assert re.search(told, text), text
 
 

@@ -23,6 +23,7 @@ def test_bounds(body: Geometry) -> None:
     np.testing.assert_allclose(body.low, [-X, -Y, 0.0])
     np.testing.assert_allclose(body.high, [X, Y, TOP])
     assert body.size == pytest.approx(SIZE) and body.height == pytest.approx(TOP)
+    assert body.volume == pytest.approx(np.prod(SIZE))
 
 
 def test_distance_is_zero_inside(body: Geometry) -> None:
