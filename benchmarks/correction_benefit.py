@@ -38,7 +38,6 @@ from palpate.correction.samples.tool_columns import tool_columns
 from palpate.dataset import open_dataset
 from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.measurement.metrics import paper_distance
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec
 from palpate.synthetic import HiddenEffect, Scenario, make_dataset
 
@@ -164,7 +163,7 @@ def _replayed(recorder: Recorder, corrector: Corrector) -> tuple[np.ndarray, lis
 
 
 def _errors(recorder: Recorder, samples: Samples, frames: list[CorrectedFrame]) -> list[float]:
-    surface, rows = Surface.of(recorder.setup), samples.rows([TESTED])
+    surface, rows = recorder.setup.surface(), samples.rows([TESTED])
     batch, errors = samples.batch(rows), []
     for row, frame in enumerate(samples.column("frame", rows)):
         points = batch.points[row, : int(batch.count[row, 1])].numpy().astype(float)

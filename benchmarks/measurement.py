@@ -8,7 +8,7 @@ from rich.table import Table
 from benchmarks.cpu_time import timed
 from benchmarks.reference_pokes import SETUP
 from palpate.measurement.patch_averages import patch_means
-from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.measurement.surface_gaps import gaps
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import replay
 
@@ -24,7 +24,7 @@ def run() -> list[Table]:
     centres = np.array([[0.0, 0.0, z + 5e-3 - depth] for depth in (2e-3, 4e-3)])
     frame = replay(SETUP, centres, GridSpec(nodes=(11, 9, 7), spacing=1.5e-3))[-1]
     surface, camera, rng = (
-        Surface(SETUP.box),
+        SETUP.surface(),
         np.array([0.02, -0.05, 0.35]),
         np.random.default_rng(0),
     )

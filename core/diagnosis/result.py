@@ -14,7 +14,6 @@ from palpate.diagnosis.report.error_patterns import ErrorPatterns, patterns_figu
 from palpate.foundation.errors import RunError
 from palpate.foundation.figure import save_figure
 from palpate.foundation.progress import Report, silent
-from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Box
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ class DiagnosisResult:
             )
         size = self.model["setup"]["geometry"]["size"]
         x, y, z = (float(length) for length in size)
-        figure = patterns_figure(ErrorPatterns.load(patterns), Surface(Box(size=(x, y, z))))
+        figure = patterns_figure(ErrorPatterns.load(patterns), Box(size=(x, y, z)).surface())
         if file is not None:
             save_figure(figure, Path(file))
         return figure

@@ -11,7 +11,6 @@ from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.forward.ray_comparison import compare
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import Surface
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
 
@@ -36,7 +35,7 @@ def corrected_prediction(
         correct: the correction of a frame.
         tools: (g, 13) tool of each group, see `tool_inputs`.
     """
-    surface = Surface.of(setup)
+    surface = setup.surface()
     frames = [correct(frame, tool) for frame, tool in zip(model.equilibria, tools, strict=True)]
     rows = zip(data.groups, frames, model.samples, strict=True)
     means = [compare(group, setup, frame, surface, sample).means for group, frame, sample in rows]

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.replay.replay import Equilibrium
+from palpate.setup.phantom_geometry import Surface
 
 __all__ = ["PAPER_GRID", "paper_distance", "supersampled"]
 

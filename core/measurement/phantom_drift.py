@@ -18,12 +18,13 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.patch_averages import PatchMeans, patch_means
 from palpate.measurement.segmentation import Cleaner, cleaner_for
-from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.measurement.surface_gaps import gaps
 from palpate.measurement.tool_pose import ToolShaft, find_shaft, tool_poses
 from palpate.mesh.graded_mesh import SCREEN_GRID
 from palpate.registration.registration import Registration, setup_from
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import rest
+from palpate.setup.phantom_geometry import Surface
 from palpate.setup.setup import Setup, Shape
 
 __all__ = ["PhantomDrift", "align_sequences", "measure_drift", "recorded_camera", "shift_sequences"]
@@ -127,7 +128,7 @@ def measure_drift(dataset: Dataset, registration: Registration) -> dict[str, Flo
     cleaner, shaft = cleaner_for(dataset, repaired), find_shaft(dataset, repaired)
     bare, surface = (
         rest(setup, SCREEN_GRID.for_tool(setup.tool.radius)),
-        replace(Surface.of(setup), patch=_PATCH),
+        setup.surface(patch=_PATCH),
     )
     cloud = dataset.rest_cloud()
     before = _means(setup, cloud[cleaner.clean(cloud).indices], np.zeros(3), bare, surface)

@@ -10,7 +10,6 @@ import numpy as np
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import camera_model_for
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.protocol import Meshing
 from palpate.recording.interior_fields import InteriorFields
 from palpate.recording.record_sequence import VERTEX_SPACING
@@ -71,7 +70,7 @@ class InteractiveReplay:
         self.setup = setup
         self._replay = Replay(setup, grid, _TOLERANCE)
         self._surface, self._camera = (
-            Surface.of(setup, VERTEX_SPACING),
+            setup.surface(VERTEX_SPACING),
             np.asarray(camera_model_for(setup).pose.matrix),
         )
         self._last: Equilibrium = self._replay.free

@@ -19,13 +19,14 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.phantom_drift import recorded_camera
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.surface_gaps import Gaps, Surface, gaps
+from palpate.measurement.surface_gaps import Gaps, gaps
 from palpate.measurement.tool_pose import ToolShaft, tool_poses
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.interpolation import neighbourhood_means
 from palpate.mesh.protocol import Meshing
 from palpate.recording.interior_fields import InteriorFields
 from palpate.replay.replay import Equilibrium, replay
+from palpate.setup.phantom_geometry import Surface
 from palpate.setup.setup import Setup
 
 __all__ = ["ModelRecording", "compare_with_clouds", "record"]
@@ -108,7 +109,7 @@ def compare_with_clouds(
         other: another setup and its recording; frames at rest, half of all, are copied from it if
             both setups look the same at rest.
     """
-    surface, sight = Surface.of(setup, VERTEX_SPACING), camera_model_for(setup)
+    surface, sight = setup.surface(VERTEX_SPACING), camera_model_for(setup)
     known = other[1] if other is not None and _looks_alike(other[0], setup) else None
     moved, errors, distance, paper = [], [], [], []
     for number, (frame, cloud) in enumerate(zip(frames, clouds, strict=True)):
@@ -182,7 +183,7 @@ def record(
         f"tool_radius_{model}": np.array(setup.tool.radius)
         for model, setup in (("raw", stated), ("extended", extended))
     }
-    surface = Surface.of(stated, VERTEX_SPACING)
+    surface = stated.surface(VERTEX_SPACING)
     np.savez_compressed(
         target,
         time=times,

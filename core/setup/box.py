@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
+from palpate.setup.block_surface import BlockSurface
 from palpate.setup.bounds import require_within
-from palpate.setup.phantom_geometry import Geometry
+from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry
 
 __all__ = ["Box"]
 
@@ -80,6 +81,16 @@ class Box(Geometry):
         points = np.stack([x, y, z], axis=1)
         on_side = (np.abs(points[:, :2]) == self.high[:2]).any(axis=1)
         return np.asarray(points[on_side | (points[:, 2] == self.high[2])])
+
+    def surface(
+        self,
+        spacing: float = SPACING,
+        patch: float = PATCH,
+        stated: Geometry | None = None,
+        edge: float = LEAST_EDGE,
+    ) -> BlockSurface:
+        """Top and sides, see `Geometry.surface`."""
+        return BlockSurface(self, spacing, patch, stated, edge)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -1,4 +1,6 @@
-"""Geometry of a phantom at rest: what all code outside `setup` and `mesh` may ask of any shape."""
+"""Geometry and free surface of a phantom at rest: what code outside `setup` and `mesh` may ask of
+any shape.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["CLEARANCE", "Geometry"]
+__all__ = ["CLEARANCE", "LEAST_EDGE", "PATCH", "SPACING", "Geometry", "Surface"]
 
 CLEARANCE = 1.5e-3
 """A tool farther than this from the stated phantom [m] does not touch it, even if size or pose are
 slightly wrong."""
+SPACING, PATCH = 1.5e-3, 4e-3
+"""Largest distance of vertices, and approximate edge length of a patch [m]."""
+LEAST_EDGE = 1.5e-3
+"""Distance to an edge below which points are left out [m], whatever is declared: depth cameras
+round edges."""
 
 
 class Geometry(ABC):
@@ -67,6 +74,23 @@ class Geometry(ABC):
         """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""
 
     @abstractmethod
+    def surface(
+        self,
+        spacing: float = SPACING,
+        patch: float = PATCH,
+        stated: Geometry | None = None,
+        edge: float = LEAST_EDGE,
+    ) -> Surface:
+        """The free surface as material points, divided into patches.
+
+        Args:
+            spacing: largest distance of vertices [m].
+            patch: approximate edge length of a patch [m].
+            stated: geometry that sets the numbers of vertices and patches; this one if None.
+            edge: distance to an edge of a side below which points are left out [m].
+        """
+
+    @abstractmethod
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON, SI units."""
 
@@ -79,3 +103,76 @@ class Geometry(ABC):
         ball reaches into the body.
         """
         return self.facing(centres)[0] - radius
+
+
+class Surface(ABC):
+    """The free surface of a body at rest, of material points that move with it.
+
+    A side is a part of the surface that no sharp edge divides. A stated geometry other than the
+    body's own sets the numbers of vertices and patches, so that bodies of several sizes have the
+    same.
+
+    Attributes:
+        geometry: the body.
+        patch: approximate edge length of a patch [m].
+        edge: distance to an edge of a side below which points are left out [m].
+    """
+
+    geometry: Geometry
+    patch: float
+    edge: float
+
+    @property
+    @abstractmethod
+    def vertices(self) -> FloatArray:
+        """(v, 3) rest positions [m]; vertices on an edge stand once per side."""
+
+    @property
+    @abstractmethod
+    def faces(self) -> IntArray:
+        """(t, 3) triangles, counter-clockwise from outside."""
+
+    @property
+    @abstractmethod
+    def side(self) -> IntArray:
+        """(t,) number of each triangle's side."""
+
+    @property
+    @abstractmethod
+    def patches(self) -> int:
+        """Number of patches on all sides."""
+
+    @property
+    @abstractmethod
+    def patch_centres(self) -> FloatArray:
+        """(p, 3) rest positions of the patches' centres [m]."""
+
+    @property
+    @abstractmethod
+    def patch_normals(self) -> FloatArray:
+        """(p, 3) outward normals of the patches at rest."""
+
+    @abstractmethod
+    def patch_of(self, points: FloatArray, side: IntArray) -> IntArray:
+        """Patch numbers (m,) of rest positions (m, 3) [m] on sides (m,)."""
+
+    @abstractmethod
+    def edge_distance(self, points: FloatArray, side: IntArray) -> FloatArray:
+        """Distance (m,) [m] of rest positions to the nearest edge of their side, the base
+        included.
+        """
+
+    @abstractmethod
+    def tangents(self, points: FloatArray, side: IntArray) -> FloatArray:
+        """Unit vectors (2, m, 3) along the surface at rest positions (m, 3) [m] on sides (m,).
+
+        They lead away from the nearest edges. The cross product of both is the outward normal.
+        """
+
+    def own(self, places: FloatArray) -> FloatArray:
+        """Rest positions (m, 3) [m] in this body of rest positions in the stated one."""
+        return places
+
+    def on_stated(self, places: FloatArray) -> FloatArray:
+        """Rest positions (m, 3) [m] in the stated body, the inverse of `own`."""
+        return places

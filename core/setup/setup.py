@@ -17,6 +17,7 @@ from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
 from palpate.setup.landmark_touches import PAIRINGS, Touching
 from palpate.setup.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
+from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Surface
 from palpate.setup.shape import Shape
 
 __all__ = [
@@ -242,6 +243,11 @@ class Setup:
                 key="geometry",
             )
         return self.geometry
+
+    def surface(self, spacing: float = SPACING, patch: float = PATCH) -> Surface:
+        """The free surface of the body, see `Geometry.surface`."""
+        edge = max(LEAST_EDGE, self.sensor.edge)
+        return self.geometry.surface(spacing, patch, self.registered, edge)
 
     @property
     def has_history(self) -> bool:

@@ -12,7 +12,8 @@ import numpy as np
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 from palpate.setup.fixed_region import FixedRegion, Plane
-from palpate.setup.phantom_geometry import Geometry
+from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry
+from palpate.setup.shape_surface import ShapeSurface
 from palpate.setup.surface_file import check_surface, read_surface
 
 __all__ = ["Shape", "load_shape"]
@@ -152,6 +153,16 @@ class Shape(Geometry):
         shares = np.where(shares.sum(axis=1, keepdims=True) > 1, 1 - shares, shares)
         weights = np.concatenate([1 - shares.sum(axis=1, keepdims=True), shares], axis=1)
         return np.asarray(np.einsum("mk,mki->mi", weights, corners[chosen]))
+
+    def surface(
+        self,
+        spacing: float = SPACING,
+        patch: float = PATCH,
+        stated: Geometry | None = None,
+        edge: float = LEAST_EDGE,
+    ) -> ShapeSurface:
+        """The part of the surface that is not held, see `Geometry.surface`."""
+        return ShapeSurface(self, self.corners[~self.held], spacing, patch, edge)
 
     def as_dict(self) -> dict[str, object]:
         """Plain values for JSON, SI units."""

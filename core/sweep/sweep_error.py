@@ -17,7 +17,7 @@ from palpate.foundation.errors import PalpateError, SolveError
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
 from palpate.measurement.patch_averages import patch_means
-from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.measurement.surface_gaps import gaps
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import replay
@@ -94,7 +94,7 @@ def _sums(
         times=times,
         tolerance=TOLERANCE,
     )
-    surface, sight = Surface.of(setup), camera_model_for(setup)
+    surface, sight = setup.surface(), camera_model_for(setup)
     rows = np.zeros((len(frames), 4))
     for number, (frame, cloud) in enumerate(zip(frames, sequence.clouds, strict=True)):
         if frame.outcome is not Outcome.CONVERGED:

@@ -30,7 +30,6 @@ from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.compliant_tool import tool_derivatives
 from palpate.gradients.frame_tangent import factorise_at, local_tool
-from palpate.measurement.surface_gaps import Surface
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
@@ -104,7 +103,7 @@ def traces_of(
         samples: the points that are averaged.
         effects: with history.
     """
-    block, surface = Replay(setup, grid), Surface.of(setup)
+    block, surface = Replay(setup, grid), setup.surface()
     time = loading_history_of(data, setup, touch_correction(setup, grid), tuple(frames))
     past = StressHistory(block, frames, time)
     losses = [past.stress_losses(effect.apply(setup)) for effect in effects]

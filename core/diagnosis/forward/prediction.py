@@ -23,7 +23,6 @@ from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.patch_averages import PatchMeans
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.protocol import Meshing
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
@@ -182,7 +181,7 @@ def predict(
         tolerance: of the replay, over the tool's push [1].
         samples: points to average, one sample for each group; chosen by this model without them.
     """
-    surface, block = Surface.of(setup), Replay(setup, grid, tolerance, longest_step(setup))
+    surface, block = setup.surface(), Replay(setup, grid, tolerance, longest_step(setup))
     path = tool_path_of(data, setup, grid, request)
     with_forces = path.measured is not None
     columns = (

@@ -13,9 +13,10 @@ from palpate.diagnosis.observation.outlier_patches import agrees_with_neighbours
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import PatchMeans, plain_means, within_spread
-from palpate.measurement.surface_gaps import Gaps, Surface, gaps, gaps_beside
+from palpate.measurement.surface_gaps import Gaps, gaps, gaps_beside
 from palpate.mesh.interpolation import patch_rows
 from palpate.replay.replay import Equilibrium
+from palpate.setup.phantom_geometry import Surface
 from palpate.setup.setup import Setup
 
 __all__ = ["PointComparison", "PointSample", "averaging_matrix", "choose_points", "compare"]

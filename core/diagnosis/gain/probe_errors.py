@@ -24,7 +24,6 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.metrics import paper_distance
-from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Setup
 
 __all__ = ["ProbeSums", "fixed_pattern", "paper_sums", "probe_sums", "removed_share"]
@@ -221,7 +220,7 @@ def paper_sums(
     """Sum of the paper's metric over touched groups [m] and their number, by push
     ("sequence/number").
     """
-    surface, sight = Surface.of(setup), camera_model_for(setup)
+    surface, sight = setup.surface(), camera_model_for(setup)
     by_push: dict[str, tuple[float, int]] = {}
     for item, prediction in zip(data, predictions, strict=True):
         for number, group in enumerate(item.groups):

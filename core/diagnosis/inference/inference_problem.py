@@ -14,9 +14,9 @@ from palpate.diagnosis.inference.nuisances import Nuisances
 from palpate.diagnosis.inference.parameter_blocks import ParameterBlocks
 from palpate.effects import CATALOGUE, Effect, NuisanceBlock
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import Registration
+from palpate.setup.phantom_geometry import Surface
 from palpate.setup.setup import Setup
 
 __all__ = ["InferenceProblem"]
@@ -76,7 +76,7 @@ class InferenceProblem:
     @cached_property
     def surface(self) -> Surface:
         """The block's surface as the camera sees it; SetupError for other bodies."""
-        return Surface.of(self.setup)
+        return self.setup.surface()
 
     def effects_sharing(self, block: NuisanceBlock) -> tuple[type[Effect], ...]:
         """Return the effects of the catalogue that share these nuisance parameters."""

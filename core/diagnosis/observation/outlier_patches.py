@@ -12,7 +12,7 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.patch_averages import MaskArray, patch_medians
-from palpate.measurement.surface_gaps import Surface
+from palpate.setup.phantom_geometry import Surface
 
 __all__ = ["agrees_with_neighbours", "neighbours"]
 

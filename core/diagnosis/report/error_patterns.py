@@ -18,7 +18,8 @@ from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.figure import new_figure, save_figure
-from palpate.measurement.surface_gaps import SIDES, Surface
+from palpate.setup.block_surface import SIDES
+from palpate.setup.phantom_geometry import Surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

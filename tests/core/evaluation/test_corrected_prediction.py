@@ -13,7 +13,6 @@ from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.evaluation.corrected_prediction import corrected_prediction, tool_inputs
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.metrics import paper_distance
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import rest
@@ -35,12 +34,12 @@ def test_lifted_surface_matches_a_lifted_cloud():
     data = Observations("lifted", times, stream, (Group((0,), points, True),))
     model = predict(data, SETUP, GRID)
     found = corrected_prediction(model, data, SETUP, _lifted, tool)
-    top = Surface.of(SETUP).patch_normals[:, 2] > 0.5
+    top = SETUP.surface().patch_normals[:, 2] > 0.5
     assert np.nanmean(model.gap[0, top]) == pytest.approx(LIFT, rel=0.02)
     assert np.nanmax(np.abs(found.gap[0, top])) < 0.02 * LIFT
     placed = SETUP.phantom_from_camera.apply(points)
     before, after = (
-        paper_distance(placed, one.equilibria[0], Surface.of(SETUP)) for one in (model, found)
+        paper_distance(placed, one.equilibria[0], SETUP.surface()) for one in (model, found)
     )
     assert after < before
 

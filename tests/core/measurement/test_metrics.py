@@ -5,11 +5,10 @@ import pytest
 from pushed_block import GRID, SETUP, SIZE, TOP, poke
 
 from palpate.measurement.metrics import PAPER_GRID, paper_distance, supersampled
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.replay.replay import Equilibrium, replay, rest
 
-SURFACE = Surface(SETUP.box)
+SURFACE = SETUP.surface()
 
 
 @pytest.fixture(scope="module")

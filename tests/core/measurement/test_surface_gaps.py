@@ -4,17 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shapes import box_surface
 
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import SIDES, Surface, gaps
+from palpate.measurement.surface_gaps import gaps
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import Equilibrium, replay, rest
-from palpate.setup.setup import Box, Setup, Tool
+from palpate.setup.block_surface import SIDES
+from palpate.setup.setup import Box, Setup, Shape, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = SIZE[2]
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
-SURFACE = Surface(SETUP.box)
+SURFACE = SETUP.surface()
 CAMERA = np.array([-0.19, -0.16, 0.28])
 
 
@@ -162,3 +164,14 @@ def test_sides_that_the_camera_grazes_are_left_out(flat):
     above = np.array([-0.10, 0.0, 0.50])
     found = gaps(_seen(flat, 3000, 7, ("-x",)), above, flat, SURFACE)
     assert not (found.side == SIDES.index("-x")).any()
+
+
+def test_block_as_a_surface_of_triangles_gives_the_same_gaps(dented: Equilibrium) -> None:
+    points = _along_rays(_seen(dented, 3000, 5), 1e-3)
+    one = gaps(points, CAMERA, dented, SURFACE)
+    other = gaps(points, CAMERA, dented, Shape(*box_surface(SIZE)).surface())
+    both = np.intersect1d(one.index, other.index)
+    assert len(both) > 0.99 * max(len(one.index), len(other.index))
+    apart = one.gap[np.isin(one.index, both)] - other.gap[np.isin(other.index, both)]
+    # In the dent the triangles of both differ, and so do their normals.
+    assert np.median(np.abs(apart)) < 1e-6 and np.quantile(np.abs(apart), 0.99) < 5e-5

@@ -14,7 +14,7 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.outlier_patches import neighbours
 from palpate.foundation.arrays import FloatArray
 from palpate.measurement.patch_averages import MaskArray
-from palpate.measurement.surface_gaps import Surface
+from palpate.setup.phantom_geometry import Surface
 
 __all__ = ["isolated_errors"]
 

@@ -25,7 +25,7 @@ from palpate.diagnosis.observation.force_record import (
     force_scatter,
 )
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import Surface
+from palpate.setup.phantom_geometry import Surface
 
 __all__ = ["Noise", "noises", "patch_variance", "rows_of", "scatter_share", "smooth_basis"]
 

@@ -19,7 +19,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import patch_means
 from palpate.measurement.segmentation import Cleaner
-from palpate.measurement.surface_gaps import Surface, gaps
+from palpate.measurement.surface_gaps import gaps
 from palpate.mesh.protocol import Meshing
 from palpate.registration.pose import motion_jacobian
 from palpate.replay.replay import rest
@@ -61,7 +61,7 @@ class RestCloud:
         """
         clean = cleaner.clean(cloud)
         table, height, scatter = _table_cells(clean.table_points)
-        surface, sight = Surface.of(setup), camera_model_for(setup, reference=True)
+        surface, sight = setup.surface(), camera_model_for(setup, reference=True)
         points = sight.place(cloud[clean.indices])
         seen = gaps(
             points, sight.pose.translation, rest(setup, grid), surface, lowest=cleaner.lowest
@@ -125,7 +125,7 @@ class RestCloud:
             np.concatenate([self.centres, self.table])
         )
         gap = camera_model_for(setup, reference=True).place(rays)
-        gap[: len(self.centres)] -= rest(setup, grid).move(Surface.of(setup).own(self.centres))
+        gap[: len(self.centres)] -= rest(setup, grid).move(setup.surface().own(self.centres))
         return np.concatenate(
             [
                 np.einsum("ni,ni->n", gap[: len(self.centres)], self.normals),

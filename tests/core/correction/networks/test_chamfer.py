@@ -10,7 +10,6 @@ from palpate.correction import Batch, Body, SurfaceLoss
 from palpate.correction.networks.chamfer import _by_all, hold_weights, nearest
 from palpate.foundation.errors import CorrectionError
 from palpate.measurement.metrics import paper_distance
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import rest
 from palpate.setup.setup import Box, Setup, Tool
@@ -58,7 +57,7 @@ def test_chamfer_is_the_papers_metric():
     apart, valid = SurfaceLoss(body, _seen(body)).distances(batch.positions, batch)
     frame = rest(setup, GridSpec(nodes=(5, 4, 3)))
     for row in range(len(batch)):
-        expected = paper_distance(batch.points[row][valid[row]].numpy(), frame, Surface(setup.box))
+        expected = paper_distance(batch.points[row][valid[row]].numpy(), frame, setup.surface())
         assert apart[row][valid[row]].mean() == pytest.approx(expected, rel=1e-5)
 
 

@@ -8,7 +8,6 @@ from shapes import filled_box
 from palpate.correction import Body
 from palpate.foundation.errors import CorrectionError
 from palpate.measurement.metrics import supersampled
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.replay.replay import replay
 
@@ -19,7 +18,7 @@ def test_surface_is_that_of_the_papers_metric():
     frame = replay(SETUP, np.array([poke(2e-3), poke(4e-3)]), GRID)[-1]
     body = Body.block(SIZE, NODES)
     assert np.allclose(
-        body.surface(frame.move(body.rest)), supersampled(frame, Surface(SETUP.box)), atol=1e-12
+        body.surface(frame.move(body.rest)), supersampled(frame, SETUP.surface()), atol=1e-12
     )
 
 

@@ -33,7 +33,6 @@ from palpate.effects.base import with_effects
 from palpate.effects.elastic_material import StiffInclusion
 from palpate.effects.sensor import TimeOffset
 from palpate.effects.tool import ToolRadius
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec
 
 NOTHING = Survivor(SETUP)
@@ -49,7 +48,7 @@ def scene() -> Scene:
     """A camera that sees the top and two sides, six points to a patch with 0.3 mm of noise;
     nuisances known exactly.
     """
-    surface = Surface(SETUP.box)
+    surface = SETUP.surface()
     seen = (surface.patch_normals @ [-0.6, -0.5, 0.6]) > 0
     return Scene(
         stated=NOTHING,

@@ -28,7 +28,6 @@ from palpate.effects.geometry import GeometryScale
 from palpate.effects.sensor import CameraRegistration, DepthBias
 from palpate.effects.tool import LandmarkMismatch
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import Surface
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.box_mesh import GridSpec
 from palpate.registration.pose import small_motion
@@ -263,7 +262,7 @@ def test_noise_stays_what_it_is_under_a_model_that_turns_its_sides_to_the_camera
     item = observed(SETUP, CENTRES[:1], noise=2e-3, count=20000)
     here = predict(item, SETUP, GRID)
     there = _again(item, replace(SETUP, load=Load(specific_weight_over_stiffness=4.0)), here)
-    sides = Surface(SETUP.box).patch_normals[:, 2] < 0.5
+    sides = SETUP.surface().patch_normals[:, 2] < 0.5
     kept = sides & (here.count[0] >= 8)
     change = np.median((there.spread[0, kept] / here.spread[0, kept]) ** 2) - 1
     assert abs(change) < 0.005
@@ -274,7 +273,7 @@ def test_reference_group_does_not_feel_the_cameras_later_shift(data):
     groups = (replace(data.groups[0], frames=(), reference=True), data.groups[0])
     item = replace(data, groups=groups)
     before, after = predict(item, SETUP, GRID, WANTED), predict(item, _camera_lifted(1e-3), GRID)
-    top = Surface(SETUP.box).patch_normals[:, 2] > 0.5
+    top = SETUP.surface().patch_normals[:, 2] > 0.5
     assert (
         not before.columns[0].any() and np.nanmean(before.columns[1, top, TOOL_COLUMNS + 1]) > 0.5
     )
@@ -290,7 +289,7 @@ def test_group_without_equilibrium_is_named_and_gains_nothing():
     item = Observations("deep", times, stream, tuple(Group((n,), points, False) for n in range(3)))
     found = predict(item, SETUP, GRID, WANTED)
     assert found.failed == (1,)
-    surface = Surface(SETUP.box)
+    surface = SETUP.surface()
     # A baseline that did find its equilibrium there: in that group the failed model changes
     # nothing.
     honest = replace(found, equilibria=(found.equilibria[0],) * 3, gap=np.nan_to_num(found.gap))

@@ -9,11 +9,10 @@ from palpate.diagnosis.forward.ray_comparison import PointComparison, choose_poi
 from palpate.diagnosis.observation.frame_groups import Group
 from palpate.effects.sensor import CameraRegistration, DepthBias
 from palpate.measurement.camera_model import camera_model_for
-from palpate.measurement.surface_gaps import Surface
 from palpate.replay.replay import rest
 from palpate.setup.setup import Setup
 
-SURFACE, BLOCK = Surface(SETUP.box), rest(SETUP, GRID)
+SURFACE, BLOCK = SETUP.surface(), rest(SETUP, GRID)
 SHIFT = np.array([5e-3, 1e-3, 0.0])
 MOVED = CameraRegistration(tx=5e-3, ty=1e-3, tz=0.0, rx=0.0, ry=0.0, rz=0.0).apply(SETUP)
 

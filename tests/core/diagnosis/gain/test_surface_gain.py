@@ -15,7 +15,6 @@ from palpate.effects.time_dependence import PermanentSet
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.measurement.metrics import paper_distance
-from palpate.measurement.surface_gaps import Surface
 from palpate.mesh.box_mesh import GridSpec
 from palpate.replay.replay import rest
 
@@ -187,7 +186,7 @@ def test_sequences_without_any_touch_are_refused():
 
 def test_papers_metric_is_the_mean_over_touched_groups():
     found = _ladder([0, 1, 2], [FLOOR, 2e-3, 3e-3], [FLOOR, 2e-3, 3e-3])
-    wanted = paper_distance(POSE.apply(CLOUD), rest(SETUP, GridSpec()), Surface(SETUP.box))
+    wanted = paper_distance(POSE.apply(CLOUD), rest(SETUP, GridSpec()), SETUP.surface())
     assert found.paper == pytest.approx((wanted, wanted))
 
 

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.observation.outlier_patches import _medians, agrees_with_neighbours
-from palpate.measurement.surface_gaps import Surface
 from palpate.setup.setup import Box
 
-SURFACE = Surface(Box(size=(0.06, 0.04, 0.03)))
+SURFACE = Box(size=(0.06, 0.04, 0.03)).surface()
 HIDDEN = 20
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.inference.noise.isolated_errors import isolated_errors
-from palpate.measurement.surface_gaps import Surface
 from palpate.setup.box import Box
 
-SURFACE = Surface(Box(size=(0.07, 0.04, 0.036)))
+SURFACE = Box(size=(0.07, 0.04, 0.036)).surface()
 CENTRES = SURFACE.patch_centres
 GROUPS, SIGMA = 20, 1e-4
 TOP = np.flatnonzero(SURFACE.patch_normals[:, 2] > 0.5)

@@ -10,7 +10,6 @@ from scipy.linalg import null_space
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.noise.noise_model import Noise, noises, patch_variance
 from palpate.foundation.arrays import FloatArray
-from palpate.measurement.surface_gaps import Surface
 from palpate.replay.replay import replay
 
 GROUPS, PATCHES, COLUMNS, FIELDS = 4, 6, 2, 3
@@ -130,7 +129,7 @@ def test_model_without_any_equilibrium_neither_gains_nor_loses():
 
 
 def test_noise_states_the_engines_accuracy_at_every_touched_patch():
-    surface = Surface(SETUP.box)
+    surface = SETUP.surface()
     centres = np.array([poke(-6e-3), poke(3e-3)])
     frames = tuple(replay(SETUP, centres, GRID))
     random = np.random.default_rng(3)
@@ -157,7 +156,7 @@ def test_noise_states_the_engines_accuracy_at_every_touched_patch():
 
 
 def test_group_without_equilibrium_in_the_baseline_has_no_weight():
-    surface = Surface(SETUP.box)
+    surface = SETUP.surface()
     gap, columns = np.full((3, surface.patches), 1e-4), np.zeros((3, surface.patches, 1))
     whole = prediction(gap, columns=columns)
     fine = prediction(gap, failed=(2,))
