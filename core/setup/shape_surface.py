@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -54,6 +54,8 @@ class ShapeSurface(Surface):
         """Number of the side of each stated triangle (t,), and the ends (e, 2, 3) [m] of all edges
         of sides.
         """
+        import trimesh
+
         vertices, faces = self._joined
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         smooth = mesh.face_adjacency_angles < _SHARP
@@ -68,11 +70,14 @@ class ShapeSurface(Surface):
     @cached_property
     def _mesh(self) -> tuple[FloatArray, IntArray, IntArray]:
         """Vertices, triangles and their sides, with no edge longer than the spacing."""
+        import trimesh
+
+        remesh: Any = trimesh.remesh
         vertices, faces, sides, count = [], [], [], 0
         side, _ = self._borders
         for number in range(int(side.max()) + 1):
             own, index = np.unique(self._joined[1][side == number], return_inverse=True)
-            fine, triangles = trimesh.remesh.subdivide_to_size(
+            fine, triangles = remesh.subdivide_to_size(
                 self._joined[0][own], index.reshape(-1, 3), self.spacing, max_iter=20
             )
             fine, merged = np.unique(fine, axis=0, return_inverse=True)

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from shapes import box_surface
@@ -16,7 +14,7 @@ from palpate.setup.setup import Box, Setup, Shape, Tool
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = SIZE[2]
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
-SURFACE = SETUP.surface()
+SURFACE = Box(size=SIZE).surface()
 CAMERA = np.array([-0.19, -0.16, 0.28])
 
 
@@ -155,7 +153,7 @@ def test_points_off_the_block_at_an_edge_or_far_away_are_left_out(flat):
 
 def test_points_near_an_edge_that_a_filter_rounds_are_left_out(flat):
     points = np.array([[SIZE[0] / 2 - away, 0.0, TOP] for away in (2e-3, 3.9e-3, 4.1e-3)])
-    rounded = replace(SURFACE, edge=4e-3)
+    rounded = Box(size=SIZE).surface(edge=4e-3)
     assert gaps(points, CAMERA, flat, SURFACE).index.tolist() == [0, 1, 2]
     assert gaps(points, CAMERA, flat, rounded).index.tolist() == [2]
 
