@@ -32,7 +32,7 @@ LONGEST_LABEL = 150
 """Letters of a label in an id, so that the id can name a file: also an export's, which names its
 dataset's or run's."""
 _FAILURES = 3
-"""Errors of the queue in a row after which it gives up."""
+"""Errors of the queue in a row, from which it could not recover, after which it gives up."""
 _PAUSE = 1.0
 """Time from an error of the queue to the next attempt [s]."""
 
@@ -222,8 +222,8 @@ class JobQueue:
         return known
 
     def _serve(self) -> None:
-        """Run waiting jobs. After an error of the queue itself it goes on; after several, it gives
-        up.
+        """Run waiting jobs. After an error of the queue itself it puts the job back and goes on;
+        where that fails several times, it gives up.
         """
         closing, failures = self._runner.patience.closing, 0
         while (identity := self._waiting.get()) is not None and not closing.is_set():
@@ -236,30 +236,39 @@ class JobQueue:
                 if closing.is_set():
                     return
                 log.exception("the job queue stopped at %s", identity)
+                lasting = isinstance(error, RunError)  # the runner has tried several times
+                if not lasting and self._recover(identity, f"{type(error).__name__}: {error}"):
+                    failures = 0
+                    continue
                 failures += 1
-                if isinstance(error, RunError) or failures == _FAILURES:
+                if lasting or failures == _FAILURES:
                     self._stopped = str(error)
                     self._failed(f"the job queue gives up: {error}")
                     return
-                self._recover(identity, f"{type(error).__name__}: {error}")
+                closing.wait(_PAUSE)
+                self._waiting.put(identity)
 
-    def _recover(self, identity: str, text: str) -> None:
-        """Put a job back whose run met an error of the queue; fail it the second time."""
+    def _recover(self, identity: str, text: str) -> bool:
+        """Put a job back whose run met an error of the queue; fail it the second time. Returns
+        whether that could be written.
+        """
         self._stopped = f"the job queue stopped at {identity} ({text}) and was started again"
         write = self._runner.patience.write
         try:
             if identity in self._put_back:
                 error = {"kind": "InternalError", "message": text, "where": {}}
                 write(self._runner.finish, identity, JobState.FAILED, error=error)
-                return
+                return True
             write(self._records.put_back, identity)
             note = f"put back, since the queue met {text}"
             write(self._records.note, identity, "warning", note)
-            self._put_back.add(identity)
         except Exception:  # any one, as above
             log.exception("%s could not be put back", identity)
+            return False
+        self._put_back.add(identity)
         self._runner.patience.closing.wait(_PAUSE)
         self._waiting.put(identity)
+        return True
 
 
 def _request_of(job: Job) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from job_functions import TARGETS, ended, reached
 
 from palpate.app.http_errors import NoSpace
 from palpate.app.jobs.job_queue import JobQueue
-from palpate.app.jobs.job_records import JobState
+from palpate.app.jobs.job_records import Job, JobState
 from palpate.foundation.errors import RunError
 
 
@@ -120,6 +120,27 @@ def test_error_of_the_queue_puts_the_job_back_once(jobs: JobQueue, tmp_path: Pat
     assert ended(jobs, jobs.get(first)).state is JobState.DONE
     second = count(jobs, tmp_path, "second")
     assert ended(jobs, jobs.get(second)).state is JobState.DONE
+    assert not jobs.trouble
+
+
+def test_queue_outlives_jobs_that_it_cannot_run(
+    jobs: JobQueue, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = jobs._runner.run
+
+    def failing(job: Job) -> None:
+        if "bad" in job.request["result"]:
+            raise RuntimeError("this job stops the queue")
+        run(job)
+
+    monkeypatch.setattr(jobs._runner, "run", failing)
+    bad = [count(jobs, tmp_path, f"bad-{number}") for number in range(2)]
+    good = count(jobs, tmp_path, "good")
+    assert ended(jobs, jobs.get(good)).state is JobState.DONE
+    for identity in bad:
+        failed = ended(jobs, jobs.get(identity))
+        assert failed.state is JobState.FAILED and "stops the queue" in str(failed.error)
+    assert ended(jobs, jobs.get(count(jobs, tmp_path, "later"))).state is JobState.DONE
     assert not jobs.trouble
 
 
