@@ -134,7 +134,7 @@ def test_queue_outlives_jobs_that_it_cannot_run(
         run(job)
 
     monkeypatch.setattr(jobs._runner, "run", failing)
-    bad = [count(jobs, tmp_path, f"bad-{number}") for number in range(2)]
+    bad = [count(jobs, tmp_path, f"bad-{number}") for number in range(3)]
     good = count(jobs, tmp_path, "good")
     assert ended(jobs, jobs.get(good)).state is JobState.DONE
     for identity in bad:
