@@ -45,6 +45,13 @@ class RejectionCriteria:
         "A cause is rejected if it surely adds more than this share of the reducible error on "
         "test sequences. Less may be the mesh's error.",
     )
+    added_rms: float = threshold(
+        1e-4,
+        "m",
+        "Where test sequences have no reducible error, a cause is rejected if it surely adds more "
+        "than this to their RMS error.",
+        "derived: the smallest error that matters unless the user sets another tolerance",
+    )
     unconfirmed_gain: float = threshold(
         2.0,
         "1",

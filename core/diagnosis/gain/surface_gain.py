@@ -38,6 +38,8 @@ class SurfaceGain:
             without measured forces.
         tuned: as `removed`, for the stated model with fitted nuisances and no cause; None if it was
             not requested.
+        added: RMS [m] that the extended model surely has above the larger of baseline and noise
+            floor: the lower end of the interval.
     """
 
     baseline: float
@@ -48,6 +50,7 @@ class SurfaceGain:
     probes: int
     force: tuple[float, float, float] | None = None
     tuned: tuple[float, float, float] | None = None
+    added: float = 0.0
 
     def to_json(self, split: str) -> dict[str, Any]:
         """Plain values in millimetres and newtons, as in the report."""
@@ -103,6 +106,7 @@ def surface_gain(
     sums = probe_sums(data, (baseline, extended), extended_setup.pushes_leave_traces)
     drawn, whole = sums.rms(sums.draws(seed)), sums.rms()[0]
     low, high = np.quantile(removed_share(*drawn.T), [0.025, 0.975])
+    before, after, floor = drawn.T
     return SurfaceGain(
         baseline=float(whole[0]),
         extended=float(whole[1]),
@@ -111,6 +115,7 @@ def surface_gain(
         paper=(_paper(data, baseline, stated_setup), _paper(data, extended, extended_setup)),
         probes=len(sums.names),
         force=_force(baseline, extended),
+        added=float(np.quantile(after - np.maximum(before, floor), 0.025)),
     )
 
 

@@ -37,6 +37,8 @@ def rejection_reason(
 
 def _harm(names: str, gain: SurfaceGain | ForceGain | None) -> str:
     """Return the reason if the causes make the held-out sequences worse."""
+    if isinstance(gain, SurfaceGain) and not any(gain.removed):
+        return _added(names, gain)
     if gain is None or gain.removed[2] > -CRITERIA.rejection.added_error:
         return ""
     value, low, high = gain.removed
@@ -44,6 +46,17 @@ def _harm(names: str, gain: SurfaceGain | ForceGain | None) -> str:
         f"{names} would explain the sequences that were fitted on, but makes the test sequences "
         f"worse: it adds {-100 * value:.0f} % ({-100 * high:.0f} to {-100 * low:.0f} %) of the "
         "reducible error there, and is not named"
+    )
+
+
+def _added(names: str, gain: SurfaceGain) -> str:
+    """Return the reason if the causes add error to held-out sequences that have none to remove."""
+    if gain.added <= CRITERIA.rejection.added_rms:
+        return ""
+    return (
+        f"{names} would explain the sequences that were fitted on, but makes the test sequences "
+        f"worse: their error grows from {1e3 * gain.baseline:.2g} to {1e3 * gain.extended:.2g} mm, "
+        f"surely by {1e3 * gain.added:.2g} mm, and is not named"
     )
 
 

@@ -74,6 +74,13 @@ def test_cause_that_leaves_most_of_structure_and_error_is_rejected():
     )
 
 
+def test_cause_that_adds_error_where_none_is_to_remove_is_rejected():
+    none = replace(LADDER, baseline=0.13e-3, removed=(0.0, 0.0, 0.0), added=0.4e-3)
+    why = rejection_reason(_found(3.0, 1.2), replace(none, extended=0.72e-3))
+    assert "their error grows from 0.13 to 0.72 mm, surely by 0.4 mm" in why
+    assert rejection_reason(_found(3.0, 1.2), replace(none, added=0.05e-3)) == ""
+
+
 def test_no_cause_needs_no_rejection():
     assert rejection_reason(Findings(_found(1.0, 1.0).baseline), LADDER) == ""
 
