@@ -167,6 +167,7 @@ class Soaked:
 
     def start(self) -> bool:
         """Start it; return whether it prints an address."""
+        self._let_go()
         self.process = started(self.place, "--runs", str(self.runs), more=self.environment)
         try:
             url = address_of(self.process)
@@ -182,10 +183,14 @@ class Soaked:
         children = family(self.process.pid)
         self.process.kill()
         self.process.wait()
-        if self.process.stdout is not None:
+        self._let_go()
+        return gone(children)
+
+    def _let_go(self) -> None:
+        """Close the pipe and the connections of an ended process."""
+        if self.process is not None and self.process.stdout is not None:
             self.process.stdout.close()
         self.client.close()
-        return gone(children)
 
     def kill_child(self, draw: random.Random) -> str:
         """Kill one of its processes; return its command, empty where it has none."""
