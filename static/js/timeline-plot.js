@@ -127,7 +127,7 @@ export function frameSummary(series, frame) {
     .filter(([, frames]) => frames?.includes(frame))
     .map(([name, frames]) => {
       const reason = series.reasons?.[/** @type {Model} */ (name)]?.[frames.indexOf(frame)];
-      return `no equilibrium of the ${name} model${reason ? `: ${reason}` : ""}`;
+      return `${name} model: ${reason ?? "no equilibrium"}`;
     });
   return [...lines, ...failed];
 }

@@ -97,7 +97,7 @@ def test_lanes_tell_forces_iterations_and_frames_without_equilibrium(page: Page)
         "extended force 0.60 N",
         "raw iterations 6",
         "extended iterations 8",
-        "no equilibrium: raw",
+        "raw model: no equilibrium; the reason was not recorded",
     ):
         assert text in tip
     page.page.mouse.move(plot["x"] + 46, plot["y"] + plot["height"] / 2)
