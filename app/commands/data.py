@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -122,6 +123,7 @@ def replay(
     import palpate.replay.replay as simulation
     from palpate.app.storage.registration_store import accepted_for
     from palpate.dataset import open_dataset
+    from palpate.dataset.provenance import made_from
     from palpate.mesh.box_mesh import GridSpec, box_mesh
     from palpate.mesh.graded_mesh import REPLAY_GRID
     from palpate.mesh.protocol import Meshing
@@ -140,7 +142,7 @@ def replay(
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
         errors = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
     mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_NODES))
-    _save_frames(file, mesh, times, centres, frames, errors)
+    _save_frames(file, mesh, times, centres, frames, errors, made_from(opened.path))
     failed = _failed(frames)
     where = f"{grid} nodes" if even else "a mesh that follows the tool"
     out.print(
@@ -165,8 +167,9 @@ def _save_frames(
     centres: FloatArray,
     frames: Sequence[Equilibrium],
     errors: Sequence[MeshErrorEstimate],
+    made: dict[str, Any],
 ) -> None:
-    """Write the frames with the surface of a mesh of the block at rest."""
+    """Write the frames with the surface of a mesh of the block at rest, and `made_from` as JSON."""
     used, quads = np.unique(mesh.free_surface, return_inverse=True)
     rest = mesh.nodes[used]
     _save(
@@ -182,6 +185,7 @@ def _save_frames(
         mesh_error=np.array(
             [(error.frame, error.displacement, error.relative, error.force) for error in errors]
         ).reshape(-1, 4),
+        made_from=np.array(json.dumps(made)),
     )
 
 

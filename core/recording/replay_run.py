@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate.dataset import Dataset
+from palpate.dataset.provenance import made_from
 from palpate.effects import Effect
 from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.processes import ProcessPool
@@ -44,7 +45,7 @@ def replay_into(
         workers: processes.
         report: progress.
     """
-    names = sequences_with_clouds(dataset, sequences)
+    names, made = sequences_with_clouds(dataset, sequences), made_from(dataset.path)
     report(0.0, "relating robot, camera and phantom")
     experiment = Experiment.of(dataset)
     stated = experiment.stated
@@ -78,14 +79,19 @@ def replay_into(
         *experiment.warnings,
         *([f"{failed} frames found no equilibrium."] if failed else []),
     ]
-    _write_run(out, dataset, extended, effects, warnings)
+    _write_run(out, dataset, extended, effects, warnings, made)
     return failed
 
 
 def _write_run(
-    out: Path, dataset: Dataset, extended: Setup, effects: Sequence[Effect], warnings: Sequence[str]
+    out: Path,
+    dataset: Dataset,
+    extended: Setup,
+    effects: Sequence[Effect],
+    warnings: Sequence[str],
+    made: dict[str, Any],
 ) -> None:
-    """Write model.json and report.json of a replay."""
+    """Write model.json and report.json of a replay, which states `made_from`."""
     registered = {"registration": dataset.accepted.to_json()} if dataset.accepted else {}
     model = {
         "format": 1,
@@ -103,6 +109,7 @@ def _write_run(
         "verdict": "replay",
         "causes": [_cause(one) for one in effects],
         "warnings": list(warnings),
+        "made_from": made,
         **registered,
     }
     (out / "model.json").write_text(json.dumps(model, indent=1))

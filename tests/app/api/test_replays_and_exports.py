@@ -56,6 +56,8 @@ def test_a_replay_becomes_a_run_of_its_own(palpate: Client, client: httpx.Client
     assert heading["verdict"] == "replay" and heading["sentence"].startswith(
         "Replayed with the size of the tool"
     )
+    made = client.get(f"/api/runs/{run}/report").json()["made_from"]
+    assert made["data"] and made["version"] and made["code"]
     assert [one["name"] for one in heading["sequences"]] == ["poke-01"] and "for-replay" in heading[
         "notes"
     ][0]
