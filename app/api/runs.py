@@ -176,7 +176,9 @@ def _listed(run: Run) -> dict[str, Any] | None:
     try:
         return _heading(run)
     except (*DAMAGED, FileNotFoundError):
-        if not run.path.is_dir():
+        try:
+            changed = run.path.stat().st_mtime
+        except FileNotFoundError:
             return None
         return {
             "id": run.name,
@@ -184,7 +186,7 @@ def _listed(run: Run) -> dict[str, Any] | None:
             "folder": None,
             "verdict": "unreadable",
             "causes": [],
-            "created": 0.0,
+            "created": changed,
             "data_changed": None,
         }
 

@@ -90,5 +90,5 @@ class Phantoms:
 
 def _read(dataset: Dataset) -> Phantom:
     cloud, config = dataset.rest_cloud(), dataset.config
-    drawn = cloud[:: -(-len(cloud) // MOST_DRAWN)].copy()
+    drawn = cloud[:: 1 + (len(cloud) - 1) // MOST_DRAWN].copy() if len(cloud) else cloud
     return Phantom(drawn, config.size, dict(config.landmarks), config.to_phantom)

@@ -93,21 +93,6 @@ class BlockSurface(Surface):
             np.concatenate(sides),
         )
 
-    @property
-    def vertices(self) -> FloatArray:
-        """(v, 3) rest positions [m]; vertices on an edge stand once per side."""
-        return self._mesh[0]
-
-    @property
-    def faces(self) -> IntArray:
-        """(t, 3) triangles, counter-clockwise from outside."""
-        return self._mesh[1]
-
-    @property
-    def side(self) -> IntArray:
-        """(t,) number in SIDES of each triangle."""
-        return self._mesh[2]
-
     @cached_property
     def _layout(self) -> tuple[list[tuple[int, int]], IntArray]:
         shapes = []

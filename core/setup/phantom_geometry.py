@@ -124,18 +124,23 @@ class Surface(ABC):
 
     @property
     @abstractmethod
+    def _mesh(self) -> tuple[FloatArray, IntArray, IntArray]:
+        """Vertices, faces and side, see the properties of these names."""
+
+    @property
     def vertices(self) -> FloatArray:
         """(v, 3) rest positions [m]; vertices on an edge stand once per side."""
+        return self._mesh[0]
 
     @property
-    @abstractmethod
     def faces(self) -> IntArray:
         """(t, 3) triangles, counter-clockwise from outside."""
+        return self._mesh[1]
 
     @property
-    @abstractmethod
     def side(self) -> IntArray:
         """(t,) number of each triangle's side."""
+        return self._mesh[2]
 
     @property
     @abstractmethod

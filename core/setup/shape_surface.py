@@ -91,21 +91,6 @@ class ShapeSurface(Surface):
             np.concatenate(sides),
         )
 
-    @property
-    def vertices(self) -> FloatArray:
-        """(v, 3) rest positions [m]; vertices on an edge stand once per side."""
-        return self._mesh[0]
-
-    @property
-    def faces(self) -> IntArray:
-        """(t, 3) triangles, counter-clockwise from outside."""
-        return self._mesh[1]
-
-    @property
-    def side(self) -> IntArray:
-        """(t,) number of each triangle's side."""
-        return self._mesh[2]
-
     @cached_property
     def _normals(self) -> tuple[FloatArray, FloatArray]:
         """Outward normals (t, 3) and areas (t,) [m^2] of the triangles."""
