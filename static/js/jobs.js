@@ -123,7 +123,7 @@ function drawPanel() {
           { href: "/api/diagnostics", download: "palpate-diagnostics.txt" },
           "Download diagnostics",
         ),
-        ": versions, settings, last jobs and the log, to report a fault; no measurements.",
+        ": versions, settings, last jobs and the log, to report a fault; no file of a dataset.",
       ),
     );
   placeRows(
