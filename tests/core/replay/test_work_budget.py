@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from pushed_block import GRID, SETUP, TOP
 
+from benchmarks.situations import draw_situation
+from palpate.fem.model import BlockModel
 from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
 from palpate.replay import work_budget
 from palpate.replay.replay import replay
 from palpate.replay.work_budget import WorkBudget, WorkSpentError
@@ -32,6 +35,23 @@ def test_push_beyond_its_budget_is_given_up_and_the_next_one_is_replayed(
         assert np.allclose(one.displacement, other.displacement, atol=1e-7)
 
 
+def test_extreme_push_takes_no_more_factorisations_than_are_stated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counted, factorise = [0], BlockModel.factorise
+
+    def count(model: BlockModel, data: FloatArray) -> None:
+        counted[0] += 1
+        factorise(model, data)
+
+    monkeypatch.setattr(BlockModel, "factorise", count)
+    # A jump of a tool with a spring and friction, of which the last step takes thousands.
+    extreme = draw_situation(139, by_size=0.0)
+    frames = replay(extreme.setup, extreme.centres, extreme.grid, times=extreme.times)
+    assert counted[0] <= 2000 + 20 * len(frames)
+    assert [frame.outcome.name for frame in frames] == ["CONVERGED"] * 6 + ["GIVEN_UP"]
+
+
 def test_work_of_a_push_is_bounded_and_each_push_has_its_own() -> None:
     budget = WorkBudget()
     for _ in range(2):
@@ -47,7 +67,7 @@ def test_work_of_a_push_is_bounded_and_each_push_has_its_own() -> None:
 
 def test_replay_tells_what_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
-    monkeypatch.setattr("palpate.replay.replay._TELLING", 0.0)
+    monkeypatch.setattr("palpate.replay.replay._TELLING", 0.0, raising=False)
     replay(SETUP, CENTRES, GRID, report=lambda _, text: told.append(text))
     assert told[0] == "frame 1 of 8" and told[-1].startswith("frame 8 of 8, about ")
     assert told[-1].endswith(" s left")
