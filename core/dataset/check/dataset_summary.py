@@ -195,7 +195,8 @@ def _doubts(dataset: Dataset) -> list[str]:
     if dataset.config.edge:
         doubts.append(
             f"edge-filtered depth: points within {1e3 * dataset.config.edge:.1f} mm of the "
-            "phantom's edges are left out of every comparison"
+            "phantom's edges are left out of every comparison, and a diagnosis gives no weight to "
+            "patches as near to the tool"
         )
     listed = {file for name in dataset.sequences for file in dataset.sequence(name).cloud_files}
     present = {

@@ -132,6 +132,15 @@ class NoiseCriteria:
         "An average has no weight where its patch has less than this share of the part of its "
         "group's points that it has where it is seen best.",
     )
+    smoothed: float = threshold(
+        3e-3,
+        "m",
+        "Patches this near to the tool's sphere have no weight where neighbouring points share "
+        "their noise, as a filter's do, unless the dataset states how wide its filters round "
+        "edges.",
+        "measured: with a spatial filter of 1.7 mm the averages within 2 mm of the sphere are 0.2 "
+        "mm too high, and those beyond 2.5 mm are right; without a filter all are right",
+    )
     least_freedom: int = threshold(
         50, "1", "A patch with no more degrees of freedom than this gets the median variance."
     )

@@ -61,6 +61,13 @@ class RejectionCriteria:
         "measured: without structure and without a sure gain a control of another solver named "
         "strain stiffening at 26 to 31 nats for 25; chance gives no 50 nats",
     )
+    least_at_rest: float = threshold(
+        10.0,
+        "nat",
+        "Gain on touches and rest cloud from which on they confirm a cause that no push confirms.",
+        "measured: over suite 1400 true causes that show at rest gain 12.6 to 5300 there, and "
+        "false ones -7 to 3.4; a control with a smoothing filter gained 7.4 with gravity",
+    )
     left_share: float = threshold(
         0.5,
         "1",

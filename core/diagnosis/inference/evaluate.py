@@ -220,9 +220,8 @@ class Evaluator(Posterior):
             own = state.on_diagnosis_grid = with_columns(self.replayed(known, own), own)
         fine = self.replayed(known, own, problem.fine_grid)
         places, surface = model.layout.inclusions, problem.surface if problem.clouds else None
-        state.noises = under_stated(
-            noises(own, fine, surface, slice(places[0], places[-1] + 1)), model.predictions
-        )
+        lumps, edge = slice(places[0], places[-1] + 1), problem.setup.sensor.edge
+        state.noises = under_stated(noises(own, fine, surface, lumps, edge), model.predictions)
         model = self.assemble(effects, model.setup, model.predictions, tangents, len(inclusions))
         state.temperature = self.misfit(model)
         state.stated = self.objective(model)

@@ -84,20 +84,29 @@ def _unconfirmed(names: str, findings: Findings, gain: SurfaceGain | ForceGain |
 
     A large gain alone does not: backlash of a robot was taken for a late clock by 54 nats. It is
     enough where the held-out sequences have no reducible error and can confirm nothing. Causes that
-    touches or the rest cloud show are exempt: pushes need not show them.
+    touches and the rest cloud confirm are exempt: pushes need not show them.
     """
     best = findings.best
     if best is None or gain is None or findings.structure.significant or gain.removed[1] > 0.0:
         return ""
     if not any(gain.removed) and best.gain > _far_above(findings, best):
         return ""
-    if any(effect.at_rest() for effect in best.model.effects):
+    if _gain_at_rest(best) >= CRITERIA.rejection.least_at_rest:
         return ""
     return (
         f"{names} would explain the data by {best.gain:.0f} nats, but no error that is smooth over "
         f"the surface and grows with the push is there, and on test sequences {_share(gain)} of "
         "the reducible error is removed. It is a hint, and is not named"
     )
+
+
+def _gain_at_rest(best: Trial) -> float:
+    """Return the gain on touches and rest cloud [nats]; zero where the causes do not show there."""
+    if not any(effect.at_rest() for effect in best.model.effects):
+        return 0.0
+    # The last part is that of the stated accuracies.
+    blocks = zip(best.model.blocks, best.parts[:-1], strict=True)
+    return sum(part for block, part in blocks if block.name == "rest")
 
 
 def _indistinct(names: str, findings: Findings, as_stated: Collection[str]) -> str:

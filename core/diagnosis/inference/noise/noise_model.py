@@ -16,6 +16,7 @@ import numpy as np
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.diagnosis.inference.evidence import Block, gram
+from palpate.diagnosis.inference.noise.beside_tool import beside_tool, width_of_smoothing
 from palpate.diagnosis.inference.noise.isolated_errors import isolated_errors
 from palpate.diagnosis.inference.noise.partly_seen import partly_seen
 from palpate.diagnosis.inference.noise.shared_noise import clouds_in_patches, shared_noise
@@ -125,6 +126,7 @@ class Noise:
         variance: FloatArray,
         lumps: slice,
         shared: float = 0.0,
+        edge: float = 0.0,
     ) -> Noise:
         """Make the noise of a sequence with clouds.
 
@@ -135,6 +137,7 @@ class Noise:
             variance: of single points by patch (p,) [m^2].
             lumps: the baseline's columns of local stiffness.
             shared: variance that a patch's points share in a cloud, over that of single points [1].
+            edge: width of the band that the camera's filters round [m]; zero without filters.
         """
         (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
         seen = np.isfinite(gap) & np.isfinite(finer)
@@ -166,6 +169,8 @@ class Noise:
         weights = np.where(seen, 1 / scatter, 0.0)
         patches = surface.patches
         weights[:, :patches][partly_seen(baseline.count)] = 0.0
+        smoothed = beside_tool(baseline, centres, width_of_smoothing(edge, shared))
+        weights[:, :patches][smoothed] = 0.0
         alone = isolated_errors(gap[:, :patches], weights[:, :patches], surface)
         weights[:, :patches][alone] = 0.0
         discrepancy = np.concatenate([displacement, stiffness], axis=2)
@@ -268,6 +273,7 @@ def noises(
     fine: Sequence[Prediction],
     surface: Surface | None,
     lumps: slice,
+    edge: float = 0.0,
 ) -> list[Noise]:
     """Return the noise of every sequence.
 
@@ -276,6 +282,7 @@ def noises(
         fine: on the fine mesh.
         surface: of the block; None for sequences without clouds.
         lumps: the baseline's columns of local stiffness.
+        edge: width of the band that the camera's filters round [m]; zero without filters.
     """
     seen = [item for item in baseline if not item.force_only]
     variance = patch_variance(seen) if seen else np.empty(0)
@@ -283,6 +290,6 @@ def noises(
     return [
         Noise.of_forces(b, f, lumps)
         if b.force_only or surface is None
-        else Noise.of(b, f, surface, variance, lumps, shared)
+        else Noise.of(b, f, surface, variance, lumps, shared, edge)
         for b, f in zip(baseline, fine, strict=True)
     ]

@@ -2,10 +2,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pushed_block import SETUP
 
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
+from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.residual_structure import Structure
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
@@ -108,13 +110,16 @@ def test_gain_that_nothing_confirms_is_a_hint(gain, before, removed, named):
         assert findings.hints == {"tool_compliance": why}
 
 
-def test_cause_that_touches_or_the_rest_cloud_show_needs_no_push_to_confirm_it():
+@pytest.mark.parametrize(("at_rest", "named"), [(20.0, True), (4.0, False), (-7.0, False)])
+def test_cause_that_touches_or_the_rest_cloud_show_needs_no_push_to_confirm_it(at_rest, named):
     findings = _found(1.0, 1.0)
     assert findings.best is not None
     cause = GeometryScale(scale_x=1.0, scale_y=1.04, scale_z=1.0)
-    model = replace(findings.best.model, effects=(cause,))
-    findings.best = replace(findings.best, model=model, gain=31.0, required_gain=25.0)
-    assert rejection_reason(findings, IDLE) == ""
+    blocks = tuple(Block(name, np.zeros((1, 1)), 1.0) for name in ("poke-01", "rest"))
+    model = replace(findings.best.model, effects=(cause,), blocks=blocks)
+    parts = (30.0 - at_rest, at_rest, 1.0)
+    findings.best = Trial(model, 31.0, 1.4, parts=parts, required_gain=25.0)
+    assert (rejection_reason(findings, IDLE) == "") is named
 
 
 def _faint(gain: float, ratio: float) -> Findings:
