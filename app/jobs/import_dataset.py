@@ -6,17 +6,14 @@ import contextlib
 import importlib
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from palpate.app.storage.archive import copy_folder, dataset_root, unpack
-from palpate.app.storage.dataset_import import STAGING, check_name
+from palpate.app.storage.dataset_import import STAGING, check_name, note_placing, was_placed
 from palpate.app.storage.held_folder import held_folder
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.processes import TimeUsedError, limited_memory, limited_time
 from palpate.foundation.progress import Report, part
-
-if TYPE_CHECKING:
-    from palpate.dataset import Dataset
 
 __all__ = ["import_dataset"]
 
@@ -29,15 +26,17 @@ def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
     dataset `name`.
 
     The archive stays until it is accepted or refused, so that an interrupted import can be
-    repeated.
+    repeated. Where it was interrupted after its dataset was in place, the repeated one says so.
     """
     datasets, name = Path(request["datasets"]), str(request["name"])
+    scratch = Path(request["scratch"]).name
+    note = datasets / STAGING / f"{scratch}.placed"
+    if was_placed(note, datasets / name):
+        return _placed(request, datasets / name)
     check_name(name, datasets)
     with contextlib.ExitStack() as held:
         try:
-            aside = held.enter_context(
-                held_folder(datasets / STAGING / Path(request["scratch"]).name)
-            )
+            aside = held.enter_context(held_folder(datasets / STAGING / scratch))
         except OSError as error:
             raise DatasetError(
                 f"no dataset can be imported into {datasets} ({error.strerror}): let the server "
@@ -45,17 +44,26 @@ def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
                 key="datasets",
             ) from error
         with limited_time(_TIME):
-            opened = _imported(request, aside, datasets / name, report)
+            _import(request, aside, datasets / name, note, report)
+    return _placed(request, datasets / name)
+
+
+def _placed(request: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the result of an import whose dataset is in place; its archive is deleted."""
+    from palpate.dataset import open_dataset
+
+    if request.get("archive"):
+        Path(request["archive"]).unlink(missing_ok=True)
+    opened = open_dataset(folder)
     return {
-        "dataset": name,
+        "dataset": folder.name,
         "sequences": len(opened.sequences),
         "clouds": sum(map(len, opened.loaded)),
     }
 
 
-def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report) -> Dataset:
-    """Fill `aside`, check it, and rename it to `whole`; returns the dataset."""
-    from palpate.dataset import open_dataset
+def _import(request: dict[str, Any], aside: Path, whole: Path, note: Path, report: Report) -> None:
+    """Fill `aside`, check it, and rename it to `whole`."""
     from palpate.dataset.dataset_problems import refuse_problems
     from palpate.dataset.schema import read_config
 
@@ -79,16 +87,13 @@ def _imported(request: dict[str, Any], aside: Path, whole: Path, report: Report)
             else f"more than {_TIME // 60} minutes of processor time"
         )
         raise DatasetError(f"its files take {what} to read: check what was exported") from None
-    opened = open_dataset(root)
     check_name(whole.name, whole.parent)
+    note_placing(note, root)
     try:
         os.rename(root, whole)
     except OSError:
         check_name(whole.name, whole.parent)  # another server was faster
         raise
-    if archive is not None:
-        archive.unlink(missing_ok=True)
-    return opened
 
 
 def _filled(request: dict[str, Any], archive: Path | None, aside: Path, report: Report) -> Path:

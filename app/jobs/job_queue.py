@@ -47,7 +47,8 @@ class JobQueue:
         folder: of the records.
         targets: function of each kind of job, as "module:function".
         preload: modules that the worker processes import in advance.
-        beside: folders in which a job may hold another scratch folder of its id; other servers
+        beside: folders in which a job may hold another scratch folder of its id, and files named
+            after it, which are deleted when the job is done; other servers
             may use them, too.
         tidy: is called with all jobs before each one; its text goes into the job's log.
         admit: is called before a job is queued; it raises to refuse the job.

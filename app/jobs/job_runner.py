@@ -103,6 +103,10 @@ class JobRunner:
                 shutil.rmtree(place, ignore_errors=True)
             self.running.pop(identity, None)
         write(self._ended, identity, ending, process.exitcode)
+        if self._records.get(identity).state is JobState.DONE:
+            for folder in self._beside:
+                for note in folder.glob(f"{identity}.*"):
+                    note.unlink(missing_ok=True)
         self._began.pop(identity, None)
 
     def finish(self, identity: str, state: JobState, **values: Any) -> None:

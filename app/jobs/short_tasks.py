@@ -77,6 +77,8 @@ def _save_under_free_name(registrations: RegistrationStore, stored: dict[str, An
 def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """Replay chosen sequences with the stated setup and with the requested effects; the result is a
     run.
+
+    A repeated job whose first attempt was interrupted after its run was in place returns that run.
     """
     from palpate.dataset import open_dataset
     from palpate.dataset.accepted_registration import AcceptedRegistration
@@ -85,11 +87,14 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
     from palpate.recording.saved_model import effects_from
 
     registered, scratch = request.get("registration"), Path(request["scratch"])
+    run, began, since = Path(request["runs"]) / scratch.name, time.time(), time.monotonic()
+    if run.is_dir():
+        written = json.loads((run / "origin.json").read_text())
+        return {"run": run.name, "frames_without_equilibrium": written["unsolved"]}
     dataset = open_dataset(Path(request["dataset"])).registered(
         AcceptedRegistration.from_json(registered) if registered else None
     )
     sources = made_from(dataset.path)
-    run, began, since = Path(request["runs"]) / scratch.name, time.time(), time.monotonic()
     made = scratch / run.name
     failed = replay_into(
         dataset,
@@ -106,6 +111,7 @@ def replay(request: dict[str, Any], report: Report) -> dict[str, Any]:
                 "created": began,
                 "seconds": time.monotonic() - since,
                 "made_from": sources,
+                "unsolved": failed,
             },
             indent=1,
         )
@@ -126,7 +132,9 @@ def _origin(dataset: Dataset) -> dict[str, Any]:
 def export(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """Write the requested parts of a run, or a registration, as files."""
     runs, scratch = Path(request["runs"]), Path(request["scratch"])
-    made = scratch / "files"
+    folder, made = runs / EXPORTS / scratch.name, scratch / "files"
+    if folder.is_dir():  # the first attempt was interrupted after this
+        return {"export": folder.name, "files": sorted(path.name for path in folder.iterdir())}
     made.mkdir(parents=True)
     if request.get("registration"):
         stored = RegistrationStore(runs, request["name"]).request(request["registration"])
@@ -137,7 +145,6 @@ def export(request: dict[str, Any], report: Report) -> dict[str, Any]:
         _export_run(
             RunStore(runs).get(request["run"]), request["what"], made, part(report, 0.1, 0.9)
         )
-    folder = runs / EXPORTS / scratch.name
     folder.parent.mkdir(parents=True, exist_ok=True)
     files = sorted(path.name for path in made.iterdir())
     os.rename(made, folder)

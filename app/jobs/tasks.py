@@ -36,12 +36,17 @@ TARGETS = {
 def diagnose(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """Diagnose `request["dataset"]`; the run folder, below `request["runs"]`, has the name of the
     scratch folder.
+
+    A repeated job whose first attempt was interrupted after its run was in place returns that run.
     """
     from palpate.dataset.accepted_registration import AcceptedRegistration
 
     registered = request.get("registration")
     scratch = Path(request["scratch"])
     run = Path(request["runs"]) / scratch.name
+    if run.is_dir():
+        written = json.loads((run / "report.json").read_text())
+        return {"run": run.name, "verdict": written["verdict"]}
     result = diagnose_into(
         Path(request["dataset"]),
         run,

@@ -1,13 +1,14 @@
-"""Folders and names of dataset imports."""
+"""Folders, names and notes of dataset imports."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from palpate.app.storage.result_store import NAME
 from palpate.foundation.errors import DatasetError
 
-__all__ = ["STAGING", "UPLOADS", "check_name"]
+__all__ = ["STAGING", "UPLOADS", "check_name", "note_placing", "was_placed"]
 
 STAGING = ".importing"
 """Folder below the datasets in which an import is unpacked and checked."""
@@ -25,3 +26,30 @@ def check_name(name: str, datasets: Path) -> None:
         raise DatasetError(
             f"there is a dataset {name} already: choose another name", key="name", value=name
         )
+
+
+def note_placing(note: Path, folder: Path) -> None:
+    """Write down which folder an import is about to rename to its dataset.
+
+    A server may end between the renaming and the record of it; the repeated import then finds its
+    own dataset in place.
+
+    Args:
+        note: file of this import.
+        folder: that is checked and complete.
+    """
+    note.write_text(json.dumps(_identity(folder)))
+
+
+def was_placed(note: Path, dataset: Path) -> bool:
+    """Return whether this dataset is the folder that the import noted by `note_placing`."""
+    try:
+        return bool(json.loads(note.read_text()) == _identity(dataset))
+    except (OSError, ValueError):
+        return False
+
+
+def _identity(folder: Path) -> list[int]:
+    """Device, inode and time of change [ns] of a folder, which a renaming keeps."""
+    found = folder.stat()
+    return [found.st_dev, found.st_ino, found.st_mtime_ns]
