@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -13,15 +14,19 @@ IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 __all__ = [
+    "CELL",
     "EDGE",
     "FACES",
+    "GRAZING",
     "NORMALS",
+    "SIDE_OFFSET",
     "TABLE_REACH",
     "Assignment",
     "Planes",
     "assign",
     "box_distance",
     "camera_planes",
+    "joined",
 ]
 
 FACES = ("top", "-x", "+x", "-y", "+y", "table")
@@ -29,6 +34,12 @@ FACES = ("top", "-x", "+x", "-y", "+y", "table")
 NORMALS = np.array(
     [[0, 0, 1], [-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, 1]], dtype=float
 )
+SIDE_OFFSET = 0.3
+"""Bulge of the sides over the sag of the top [1], about Poisson's ratio times width over height."""
+SAGS = np.array([1.0, *[SIDE_OFFSET] * 4, 0.0])
+"""Offset of each plane where the top sags by one [1]; the table has none."""
+CELL = 8.0e-3
+"""Edge length of the cells in which points are averaged [m]."""
 EDGE = 2.0e-3
 """Distance to an edge below which points are left out [m]: noise moves them across it, and a real
 edge is round."""
@@ -55,37 +66,44 @@ class Planes:
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """Points that lie on a plane, phantom frame.
+    """Points that lie on a stated surface, phantom frame.
 
     Attributes:
         rows: (k,) rows of the cloud.
-        face: (k,) index into FACES.
-        points: (k, 3) [m].
+        face: (k,) part of the surface that may be offset as a whole; of a block, index into FACES.
+        points: (k, 3) where their rays meet the surface [m]: free of noise, which lies along rays.
+        normals: (k, 3) of the surface, unit vectors.
         distance: (k,) signed distance [m], positive outside.
         slant: (k,) cosine between normal and line of sight [1], at least GRAZING; the part of depth
             noise in `distance`.
+        cell: (k, 3) cells of about 8 mm, whose points are averaged.
+        sag: (k,) distance that a soft body loses there where its top sags by one [1].
     """
 
     rows: IndexArray
     face: IndexArray
     points: FloatArray
+    normals: FloatArray
     distance: FloatArray
     slant: FloatArray
+    cell: IndexArray
+    sag: FloatArray
 
-    @property
-    def normals(self) -> FloatArray:
-        """(k, 3) unit normals."""
-        return np.asarray(NORMALS[self.face])
-
-    def only(self, keep: Mask) -> Assignment:
+    def only(self, keep: Mask) -> Self:
         """The points for which `keep` (k,) is true."""
-        return Assignment(
-            self.rows[keep],
-            self.face[keep],
-            self.points[keep],
-            self.distance[keep],
-            self.slant[keep],
+        return replace(
+            self, **{field.name: getattr(self, field.name)[keep] for field in fields(self)}
         )
+
+
+def joined(parts: Sequence[Assignment]) -> Assignment:
+    """The points of several assignments of one cloud."""
+    return Assignment(
+        **{
+            field.name: np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(Assignment)
+        }
+    )
 
 
 def camera_planes(size: tuple[float, float, float], camera: FloatArray) -> Planes:
@@ -116,9 +134,29 @@ def assign(points: FloatArray, planes: Planes, camera: FloatArray, gate: float) 
     rows = np.flatnonzero(far[np.arange(len(points)), face] < gate)
     face, near = face[rows], points[rows]
     sight = near - camera
-    slant = np.abs((sight * NORMALS[face]).sum(axis=1)) / np.linalg.norm(sight, axis=1)
-    found = Assignment(rows, face, near, distance[rows, face], np.maximum(slant, GRAZING))
+    sight /= lengths(sight)[:, None]
+    slope = np.einsum("ki,ki->k", sight, NORMALS[face])
+    slant = np.maximum(np.abs(slope), GRAZING)
+    feet = near + sight * (distance[rows, face] / slant)[:, None]
+    found = Assignment(
+        rows=rows,
+        face=face,
+        points=feet,
+        normals=NORMALS[face],
+        distance=distance[rows, face],
+        slant=slant,
+        cell=_cells(feet, face),
+        sag=SAGS[face],
+    )
     return found.only(_populated(found, planes)[found.face])
+
+
+def _cells(points: FloatArray, face: IndexArray) -> IndexArray:
+    """Cells (k, 3) of points (k, 3) [m] on faces (k,), flat across each face."""
+    sizes = np.where(face == FACES.index("table"), 1.5 * CELL, CELL)
+    cells = np.floor((points + EDGE) / sizes[:, None]).astype(np.int64)
+    cells[np.arange(len(points)), np.abs(NORMALS[face]).argmax(axis=1)] = 0
+    return cells
 
 
 def _populated(found: Assignment, planes: Planes) -> Mask:

@@ -21,13 +21,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from palpate.foundation.arrays import FloatArray
-from palpate.registration.faces import EDGE, FACES, Assignment, IndexArray
+from palpate.registration.faces import FACES, Assignment, IndexArray
 from palpate.registration.pose import motion_jacobian
 
 __all__ = ["PRIOR", "Patches", "PoseEstimate", "estimate", "make_patches", "weak_directions"]
 
-CELL = 8.0e-3
-"""Edge length of a patch [m]."""
 PRIOR = np.array([0.01] * 3 + [np.radians(10.0)] * 3)
 """Prior standard deviations [m, rad] about the first guess."""
 BIAS_SIZES = np.array([0.02, 0.06, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0]) * 1e-3
@@ -36,8 +34,6 @@ BIAS_USUAL = 0.5e-3
 """Scale of the half-normal prior of b [m]."""
 TOP_OFFSETS, OFFSET_ODDS = (0.0, 0.5e-3, 2.0e-3), 0.15
 """Offsets of the top that are averaged over [m], and prior odds of one that is not zero [1]."""
-SIDE_OFFSET = 0.3
-"""Bulge of the sides over the sag of the top [1], about Poisson's ratio times width over height."""
 BIAS_REACHES = (0.008, 0.016, 0.03, 0.06)
 """Lengths L of the bias that are averaged over [m]."""
 WEAK = 0.5e-3
@@ -54,10 +50,11 @@ NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Averages over cells of 8 mm on each plane, seen through one camera.
+    """Averages over cells of 8 mm on each part of the surface, seen through one camera.
 
     Attributes:
-        face: (p,) index into FACES.
+        face: (p,) part of the surface, which may be offset as a whole.
+        sag: (p,) its offset where the top sags by one [1]; zero on the table.
         distance: (p,) from the plane [m], positive outside.
         jacobian: (p, 6) of the distance.
         variance: (p,) white noise variance of the distance [m^2].
@@ -67,6 +64,7 @@ class Patches:
     """
 
     face: IndexArray
+    sag: FloatArray
     distance: FloatArray
     jacobian: FloatArray
     variance: FloatArray
@@ -88,6 +86,17 @@ class PoseEstimate:
     motion: FloatArray
     covariance: FloatArray
     bias: float
+
+    def settled(self, lever: float) -> FloatArray:
+        """The motion (6,) without its part along weak directions.
+
+        Args:
+            lever: distance at which rotations are converted [m].
+        """
+        scale = np.array([1.0] * 3 + [lever] * 3)
+        values, vectors = np.linalg.eigh(self.covariance * np.outer(scale, scale))
+        firm = vectors[:, np.sqrt(values) <= WEAK]
+        return np.asarray(firm @ (firm.T @ (self.motion * scale)) / scale)
 
 
 def make_patches(
@@ -127,6 +136,7 @@ def make_patches(
     heavy = total > 2.0
     return Patches(
         np.round(mean(found.face.astype(float))[heavy, 0]).astype(np.int64),
+        mean(found.sag)[heavy, 0],
         distance[heavy],
         mean(jacobian)[heavy],
         ((noise * slant) ** 2 / total)[heavy],
@@ -138,17 +148,8 @@ def make_patches(
 
 def _patch_of(found: Assignment) -> IndexArray:
     """Patch number (k,) of each point."""
-    cells = np.column_stack(
-        [found.face, np.floor((found.points + EDGE) / _cell_sizes(found.face)[:, None])]
-    ).astype(int)
-    cells[found.face == 0, 3] = cells[found.face == 5, 3] = 0
-    for first, axis in ((1, 1), (3, 2)):
-        cells[(found.face == first) | (found.face == first + 1), axis] = 0
+    cells = np.column_stack([found.face, found.cell])
     return np.asarray(np.unique(cells, axis=0, return_inverse=True)[1]).ravel()
-
-
-def _cell_sizes(face: IndexArray) -> FloatArray:
-    return np.where(face == FACES.index("table"), 1.5 * CELL, CELL)
 
 
 def estimate(patches: Patches) -> PoseEstimate:
@@ -156,10 +157,10 @@ def estimate(patches: Patches) -> PoseEstimate:
     bias and offsets of the block's faces.
     """
     distance = np.linalg.norm(patches.place[:, None] - patches.place[None], axis=2)
-    has_table = bool((patches.face == FACES.index("table")).any())
+    has_table = bool((patches.sag == 0).any())
     models = []
     for offset in TOP_OFFSETS if has_table else TOP_OFFSETS[:1]:
-        fixed = np.diag(patches.variance) + _shape_covariance(patches.face, offset)
+        fixed = np.diag(patches.variance) + _shape_covariance(patches, offset)
         for reach in BIAS_REACHES:
             kernel = (
                 np.exp(-0.5 * (distance / reach) ** 2)
@@ -185,9 +186,9 @@ def estimate(patches: Patches) -> PoseEstimate:
     )
 
 
-def _shape_covariance(face: IndexArray, top_offset: float) -> FloatArray:
-    """Covariance (p, p) [m^2] of patches by offsets of whole faces; the table has none."""
-    sizes = np.array([1.0, *[SIDE_OFFSET] * 4, 0.0])[face] * top_offset
+def _shape_covariance(patches: Patches, top_offset: float) -> FloatArray:
+    """Covariance (p, p) [m^2] of patches by offsets of whole parts; the table has none."""
+    sizes, face = patches.sag * top_offset, patches.face
     return np.where(face[:, None] == face[None], sizes[:, None] * sizes[None], 0.0)
 
 
@@ -251,6 +252,9 @@ def _weak_sentence(
 
 def _reason(main: list[int], counts: dict[str, int]) -> str:
     """Words on the faces that would determine these parameters, and their numbers of points."""
+    if "surface" in counts:
+        table = f"{counts['table']} points on the table" if "table" in counts else "no table"
+        return f"{counts['surface']} points on the surface, {table}"
     faces = {
         0: ("-x", "+x"),
         1: ("-y", "+y"),

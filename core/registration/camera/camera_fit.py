@@ -15,12 +15,11 @@ from palpate.registration.camera.coarse_icp import align_by_icp
 from palpate.registration.camera.guess import automatic_guess, half_turn
 from palpate.registration.faces import FACES, Assignment, assign, box_distance, camera_planes
 from palpate.registration.pose import motion_jacobian, small_motion
+from palpate.registration.robust_weights import depth_noise, robust_weights
 from palpate.registration.uncertainty import PRIOR, estimate, make_patches, weak_directions
 
 __all__ = ["CameraFit", "fit_camera", "refine_camera"]
 
-HUBER, TUKEY = 1.345, 4.685
-"""Tuning constants of the robust weights, in standard deviations; 95 % efficiency."""
 EXPLAINED_LEAST = 0.7
 """Share of points on the stated surface below which a warning is given [1]."""
 LEAST_POINTS = 50
@@ -47,6 +46,7 @@ class CameraFit:
         explained: share of the points near the block that lie on its stated surface [1].
         automatic: whether the first guess was found, not given.
         warnings: for a person.
+        alternatives: of other poses that fit about as well, without alternatives of their own.
     """
 
     phantom_from_camera: Transform
@@ -63,6 +63,7 @@ class CameraFit:
     explained: float
     automatic: bool
     warnings: tuple[str, ...]
+    alternatives: tuple[CameraFit, ...] = ()
 
     @property
     def turned(self) -> Transform:
@@ -156,11 +157,6 @@ def _pivot(size: tuple[float, float, float]) -> FloatArray:
     return np.array([0.0, 0.0, size[2]])
 
 
-def _noise(found: Assignment) -> float:
-    """Robust standard deviation of the depth noise [m], along the line of sight."""
-    return max(1.0e-5, 1.4826 * float(np.median(np.abs(found.distance / found.slant))))
-
-
 def _refine(
     cloud: FloatArray,
     size: tuple[float, float, float],
@@ -187,9 +183,10 @@ def _refine(
                 "faces or the table, "
                 f"at least {LEAST_POINTS} are needed: check [phantom] size and [camera] to_phantom"
             )
-        weights = _weights(found, _noise(found), tukey=step >= 8)
+        noise = depth_noise(found.distance, found.slant)
+        weights = robust_weights(found.distance, found.slant, noise, tukey=step >= 8)
         jacobian = np.einsum("ki,kij->kj", found.normals, motion_jacobian(found.points, pivot))
-        weighted = jacobian * (weights / (_noise(found) * found.slant) ** 2)[:, None]
+        weighted = jacobian * (weights / (noise * found.slant) ** 2)[:, None]
         drift = pose @ guess.inverse()
         pull = np.concatenate([drift.apply(pivot) - pivot, drift.rotation_vector]) / PRIOR**2
         step_vector = -np.linalg.solve(
@@ -203,14 +200,6 @@ def _refine(
         ):
             break
     return pose
-
-
-def _weights(found: Assignment, sigma: float, *, tukey: bool) -> FloatArray:
-    """Robust weights (k,) of distances scaled by their noise."""
-    scaled = np.abs(found.distance) / (sigma * found.slant)
-    if tukey:
-        return np.asarray(np.maximum(0.0, 1 - (scaled / TUKEY) ** 2) ** 2)
-    return np.asarray(np.minimum(1.0, HUBER / np.maximum(scaled, 1e-12)))
 
 
 def _explained(
@@ -288,7 +277,8 @@ def _weighted(
         ]
     )
     centred = replace(found, distance=found.distance - medians[found.face])
-    return found, _weights(centred, _noise(centred), tukey=True)
+    noise = depth_noise(centred.distance, centred.slant)
+    return found, robust_weights(centred.distance, centred.slant, noise, tukey=True)
 
 
 def _doubts(

@@ -9,7 +9,7 @@ from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.registration.camera.table_plane import TablePlane, find_table
 
-__all__ = ["automatic_guess", "half_turn"]
+__all__ = ["automatic_guess", "half_turn", "level"]
 
 HEADING_STEP = np.radians(0.5)
 """Step of the search over headings [rad]."""
@@ -31,16 +31,16 @@ def automatic_guess(
     """
     thickness = max(depth_sigma, 1.0e-3)
     table = find_table(cloud, thickness)
-    level = _level(table)
-    points = level.apply(cloud)
+    level_from_camera = level(table)
+    points = level_from_camera.apply(cloud)
     top = _block_top(points, size, thickness)
     heading, centre = _rectangle(top[:, :2], size[0], size[1])
     c, s = np.cos(heading), np.sin(heading)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    return Transform(turn, -turn @ np.array([centre[0], centre[1], 0.0])) @ level
+    return Transform(turn, -turn @ np.array([centre[0], centre[1], 0.0])) @ level_from_camera
 
 
-def _level(table: TablePlane) -> Transform:
+def level(table: TablePlane) -> Transform:
     """Transform from the camera frame to one whose plane z = 0 is the table, z upwards."""
     z = table.normal
     x = np.cross([0.0, 1.0, 0.0], z)

@@ -1,0 +1,1 @@
+"""Camera to phantom for a body of any shape: search, refinement and uncertainty."""
