@@ -135,11 +135,8 @@ class NoiseCriteria:
     smoothed: float = threshold(
         3e-3,
         "m",
-        "Patches this near to the tool's sphere have no weight where neighbouring points share "
-        "their noise, as a filter's do, unless the dataset states how wide its filters round "
-        "edges.",
-        "measured: with a spatial filter of 1.7 mm the averages within 2 mm of the sphere are 0.2 "
-        "mm too high, and those beyond 2.5 mm are right; without a filter all are right",
+        "Patches this near to the tool have no weight where a filter works that is not stated.",
+        "measured: a filter of 1.7 mm raises what is within 2 mm of the tool by 0.2 mm",
     )
     least_freedom: int = threshold(
         50, "1", "A patch with no more degrees of freedom than this gets the median variance."

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
+from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.registration.faces import (
@@ -16,6 +16,7 @@ from palpate.registration.faces import (
     SIDE_OFFSET,
     TABLE_REACH,
     Assignment,
+    IndexArray,
     joined,
 )
 from palpate.registration.pose import motion_jacobian, small_motion
@@ -113,7 +114,7 @@ def _table(
     return _Part(met, error, np.broadcast_to([0.0, 0.0, 1.0], ways.shape), TABLE)
 
 
-def _beside(points: FloatArray, body: SeenBody, rows: IntArray, gate: float) -> Assignment:
+def _beside(points: FloatArray, body: SeenBody, rows: IndexArray, gate: float) -> Assignment:
     """Points beside the body's outline, whose rays miss it, at the nearest place of its surface.
 
     They keep a pose from sliding off a part of the body.
@@ -128,7 +129,7 @@ def _beside(points: FloatArray, body: SeenBody, rows: IntArray, gate: float) -> 
 
 def _assigned(
     body: SeenBody,
-    rows: IntArray,
+    rows: IndexArray,
     feet: FloatArray,
     normals: FloatArray,
     distance: FloatArray,

@@ -16,7 +16,7 @@ __all__ = ["Hits", "SeenBody"]
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Where rays meet a surface.
+    """Places at which rays meet a surface.
 
     Attributes:
         distance: (n,) from the rays' origin [m]; infinite where a ray misses, or meets the surface

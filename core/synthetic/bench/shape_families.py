@@ -91,16 +91,16 @@ def _dome(random: np.random.Generator) -> tuple[FloatArray, IntArray]:
 
 def _liver(random: np.random.Generator) -> tuple[FloatArray, IntArray]:
     axes = 1e-3 * np.array([random.uniform(45, 60), random.uniform(28, 38), random.uniform(22, 30)])
-    thin, notch, seed = random.uniform(0.25, 0.45), random.uniform(-0.4, 0.1), random.integers(1e9)
+    thin, notch = random.uniform(0.25, 0.45), random.uniform(-0.4, 0.1)
+    seed = int(random.integers(10**9))
 
     def radius(unit: FloatArray) -> FloatArray:
         along = unit[:, 0]
         lobes = 1.0 - thin * np.clip(along, 0.0, 1.0) * unit[:, 2].clip(0.0)
         front = 1.0 / (1.0 + np.exp((unit[:, 1] - 0.3) / 0.1))
         lobes -= 0.18 * np.exp(-(((along - notch) / 0.18) ** 2)) * front
-        return _ellipsoid(unit, axes) * (
-            lobes + _waves(unit, np.random.default_rng(int(seed)), 0.05)
-        )
+        waves = _waves(unit, np.random.default_rng(seed), 0.05)
+        return np.asarray(_ellipsoid(unit, axes) * (lobes + waves))
 
     return _star(radius)
 
@@ -111,12 +111,8 @@ def _kidney(random: np.random.Generator) -> tuple[FloatArray, IntArray]:
 
     def radius(unit: FloatArray) -> FloatArray:
         hilum = deep * np.exp(-((unit[:, 0] / 0.35) ** 2)) * np.clip(unit[:, 1], 0.0, 1.0)
-        return (
-            _ellipsoid(unit, axes)
-            * (1.0 - hilum)
-            * np.where(unit[:, 0] > 0, 1.0, 1.0)
-            * (1.0 - (1.0 - other) * np.clip(unit[:, 0], 0.0, 1.0) ** 2)
-        )
+        smaller = 1.0 - (1.0 - other) * np.clip(unit[:, 0], 0.0, 1.0) ** 2
+        return np.asarray(_ellipsoid(unit, axes) * (1.0 - hilum) * smaller)
 
     return _star(radius)
 
@@ -130,7 +126,7 @@ def _breast(random: np.random.Generator) -> tuple[FloatArray, IntArray]:
     def radius(unit: FloatArray) -> FloatArray:
         near = unit @ apex
         bulge = sag * np.clip(near, 0.0, 1.0) ** 3 + tip * np.exp(-(1.0 - near) / 0.008)
-        return _ellipsoid(unit, axes) * (1.0 + bulge)
+        return np.asarray(_ellipsoid(unit, axes) * (1.0 + bulge))
 
     return _star(radius)
 
