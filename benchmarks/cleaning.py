@@ -22,10 +22,12 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.tool_pose import ToolPose, ToolShaft
+from palpate.setup.box import Box
 
 __all__ = ["run"]
 
 SIZE = (0.0687, 0.0393, 0.0358)
+BLOCK = Box(size=SIZE)
 BALL, DEPTH = 5e-3, 4e-3
 """Radius of the tool and depth of the push [m]."""
 SHAFTS = {
@@ -147,7 +149,7 @@ def _case(name: str, sigma: float) -> tuple[dict[str, list[FloatArray]], float, 
     """
     rng, pose = np.random.default_rng([7, int(1e6 * sigma), *name.encode()]), _camera()
     radius, tilt = SHAFTS[name]
-    cleaner = Cleaner(size=SIZE, phantom_from_camera=pose, tool_radius=BALL, noise=sigma)
+    cleaner = Cleaner(geometry=BLOCK, phantom_from_camera=pose, tool_radius=BALL, noise=sigma)
     pooled: dict[str, list[list[FloatArray]]] = {
         key: [[] for _ in ends[1:]] for key, ends in BINS.items()
     }

@@ -38,7 +38,7 @@ def run() -> list[Table]:
     """Segment one cloud repeatedly; RuntimeError where too many points are wrong."""
     cloud, phantom = _scene(np.random.default_rng(1))
     cleaner = Cleaner(
-        size=SETUP.geometry.size,
+        geometry=SETUP.geometry,
         phantom_from_camera=POSE,
         tool_radius=SETUP.tool.radius,
         noise=SIGMA,

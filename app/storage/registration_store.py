@@ -110,10 +110,6 @@ def accepted_for(dataset: Path, named: str | None, runs: Path) -> AcceptedRegist
 
 def refuse_unregistrable(dataset: Dataset) -> None:
     """Raise RegistrationError for a dataset whose cloud cannot be registered to its phantom."""
-    from palpate.setup.setup import Shape
-
-    if isinstance(dataset.geometry, Shape):
-        raise RegistrationError("clouds are registered to a block only, not to other shapes yet")
     if not dataset.has_rest:
         raise RegistrationError(
             "the dataset has no rest.ply: record one cloud of the untouched phantom",
@@ -146,7 +142,7 @@ def _register(dataset: Path, cloud: list[list[float]], mesh: list[list[float]]) 
     refuse_unregistrable(opened)
     config = opened.config
     registration = register_pairs(
-        opened.rest_cloud(), config.size, np.array(cloud), np.array(mesh), config.depth_sigma
+        opened.rest_cloud(), opened.geometry, np.array(cloud), np.array(mesh), config.depth_sigma
     )
     points = [{"cloud": one, "mesh": other} for one, other in zip(cloud, mesh, strict=True)]
     return {"points": points, "registration": registration.to_json(), "rest": rest_digest(dataset)}

@@ -21,8 +21,8 @@ from palpate.foundation.frames import Transform
 from palpate.measurement.hole_rims import beside_holes
 from palpate.measurement.tool_pose import SHAFT_LENGTH, ShaftSight, ToolPose, locate_tool
 from palpate.registration.camera.table_plane import find_table
-from palpate.registration.faces import box_distance
 from palpate.registration.registration import Registration
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["REASONS", "CleanCloud", "Cleaner", "cleaner_for"]
 
@@ -39,7 +39,7 @@ _HOLDER, _HEAVE = 4.0e-3, 0.5e-3
 """How far beyond the tool's radius parts of the tool are looked for, and how far a pressed phantom
 may stand out around the tool [m]."""
 TABLE_REACH = 0.08
-"""Distance from the block up to which points of the table are used [m]."""
+"""Distance from the phantom up to which points of the table are used [m]."""
 FARTHEST_TABLE, FEWEST_ON_TABLE = 8.0e-3, 100
 """Largest height of points [m], and least number of them, for a correction of the table's plane."""
 VOXEL = 2.0e-3
@@ -70,17 +70,17 @@ class Cleaner:
     """Segments the clouds of one dataset.
 
     Attributes:
-        size: of the block [m].
+        geometry: of the phantom at rest.
         phantom_from_camera: pose of the camera.
         tool_radius: of the sphere, as stated [m].
         tool_radii: smallest and largest radius [m] that the tool may have; as stated if None.
         noise: standard deviation of depth along the line of sight [m].
         table: normal (3,) and offset [m] of the table, phantom frame; z = 0 unless the rest cloud
             shows another plane. Each frame that shows enough of the table corrects it.
-        bulge: distance that the deformed or slid phantom may reach beyond the box [m].
+        bulge: distance that the deformed or slid phantom may reach beyond its rest shape [m].
     """
 
-    size: tuple[float, float, float]
+    geometry: Geometry
     phantom_from_camera: Transform
     tool_radius: float
     noise: float
@@ -104,7 +104,7 @@ class Cleaner:
         """
         points = self.phantom_from_camera.apply(cloud)
         reason = np.zeros(len(points), dtype=np.int8)
-        apart = box_distance(points, np.asarray(self.size))
+        apart = self.geometry.outside(points)
         height = self._height(points, apart)
         thickness = self._thickness
         reason[apart > self.bulge] = REASONS.index("background")
@@ -268,7 +268,10 @@ def cleaner_for(dataset: Dataset, registration: Registration) -> Cleaner:
     camera = registration.camera
     noise = float(np.hypot(camera.noise, camera.bias)) if camera else config.depth_sigma
     stated = Cleaner(
-        size=config.size, phantom_from_camera=pose, tool_radius=config.tool_radius, noise=noise
+        geometry=dataset.geometry,
+        phantom_from_camera=pose,
+        tool_radius=config.tool_radius,
+        noise=noise,
     )
     if not dataset.has_rest:
         return stated

@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 from palpate.dataset import Dataset, Kinematics
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.faces import box_distance
 from palpate.registration.registration import Registration
 
 __all__ = ["SHAFT_LENGTH", "ToolPose", "ToolShaft", "find_shaft", "locate_tool", "tool_poses"]
@@ -192,7 +191,7 @@ def find_shaft(dataset: Dataset, registration: Registration, frames: int = 3) ->
         sequence = dataset.sequence(name)
         for index in _some(len(sequence), frames):
             points = registration.phantom_from_camera.apply(sequence.cloud(int(index)))
-            apart = box_distance(points, np.asarray(dataset.config.size))
+            apart = dataset.geometry.outside(points)
             clear = points[(apart > _CLEAR) & (points[:, 2] > _CLEAR)]
             times, camera = (
                 sequence.cloud_times[index : index + 1],

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray, lengths
+from palpate.setup.box import Box
 
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -171,13 +172,8 @@ def _populated(found: Assignment, planes: Planes) -> Mask:
     )
 
 
-def box_distance(points: FloatArray, size: FloatArray) -> FloatArray:
+def box_distance(points: FloatArray, size: tuple[float, float, float]) -> FloatArray:
     """Signed distance (n,) [m] of points (n, 3), phantom frame, to the surface of the block,
     positive outside.
     """
-    half = np.asarray(size) / 2
-    outside = np.abs(points - np.array([0.0, 0.0, half[2]])) - half
-    x, y, z = outside.T
-    return np.asarray(
-        lengths(np.maximum(outside, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
-    )
+    return Box(size=size).outside(points)

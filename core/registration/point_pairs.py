@@ -16,10 +16,11 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.camera.camera_fit import CameraFit, refine_camera
-from palpate.registration.faces import box_distance
+from palpate.registration.camera.camera_fit import CameraFit
+from palpate.registration.rest_fit import refine_rest_cloud
 from palpate.registration.robot.robot_fit import rigid_fits
 from palpate.registration.uncertainty import NAMES
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["PairFit", "PairRegistration", "fit_pairs", "register_pairs"]
 
@@ -164,25 +165,25 @@ def fit_pairs(cloud: FloatArray, mesh: FloatArray) -> PairFit:
 
 def register_pairs(
     rest: FloatArray,
-    size: tuple[float, float, float],
+    geometry: Geometry,
     cloud: FloatArray,
     mesh: FloatArray,
     depth_sigma: float = 0.002,
 ) -> PairRegistration:
-    """Fit the pairs (see `fit_pairs`), then register the rest cloud to the block from there.
+    """Fit the pairs (see `fit_pairs`), then register the rest cloud to the phantom from there.
 
     Args:
         rest: (m, 3) rest cloud [m], camera frame.
-        size: of the block [m].
+        geometry: of the phantom.
         cloud: (n, 3) points of the pairs [m], camera frame.
         mesh: (n, 3) points of the pairs [m], phantom frame.
         depth_sigma: stated accuracy of depth [m].
     """
     pairs = fit_pairs(cloud, mesh)
-    camera = refine_camera(rest, size, pairs.phantom_from_camera, depth_sigma)
-    left = _distance(camera.phantom_from_camera.apply(rest), size)
+    camera = refine_rest_cloud(rest, geometry, pairs.phantom_from_camera, depth_sigma)
+    left = _distance(camera.phantom_from_camera.apply(rest), geometry)
     counted = left < COUNTED
-    before = _distance(pairs.phantom_from_camera.apply(rest[counted]), size)
+    before = _distance(pairs.phantom_from_camera.apply(rest[counted]), geometry)
     return PairRegistration(pairs, camera, _rms(before), _rms(left[counted]), int(counted.sum()))
 
 
@@ -278,11 +279,9 @@ def _exchanged(cloud: FloatArray, mesh: FloatArray) -> tuple[str, str | None]:
     return f"; exchanging the mesh points of pairs {pairs.replace(', ', ' and ')} would fit", pairs
 
 
-def _distance(points: FloatArray, size: tuple[float, float, float]) -> FloatArray:
-    """Distance (n,) [m] to the block's surface or the table, whichever is nearer."""
-    return np.asarray(
-        np.minimum(np.abs(box_distance(points, np.array(size))), np.abs(points[:, 2]))
-    )
+def _distance(points: FloatArray, geometry: Geometry) -> FloatArray:
+    """Distance (n,) [m] to the phantom's surface or the table, whichever is nearer."""
+    return np.asarray(np.minimum(np.abs(geometry.outside(points)), np.abs(points[:, 2])))
 
 
 def _rms(values: FloatArray) -> float:

@@ -10,12 +10,12 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
-from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
 from palpate.registration.camera.accepted_camera import accepted_camera_fit
-from palpate.registration.camera.camera_fit import CameraFit, fit_camera
-from palpate.registration.camera.heading import tool_misfit, turned_fit
+from palpate.registration.camera.camera_fit import CameraFit
+from palpate.registration.camera.heading import tool_misfit
+from palpate.registration.rest_fit import fit_rest_cloud, refine_rest_cloud
 from palpate.registration.robot.landmark_pairing import TouchProposal, propose_pairing
 from palpate.registration.robot.landmark_repair import (
     LandmarkRepair,
@@ -25,10 +25,12 @@ from palpate.registration.robot.landmark_repair import (
 )
 from palpate.registration.robot.robot_fit import RobotFit, fit_robot
 from palpate.registration.uncertainty import PRIOR
-from palpate.setup.setup import Material, Sensor, Setup, Shape, Tool, Touching
+from palpate.setup.setup import Material, Sensor, Setup, Tool, Touching
 
 __all__ = ["Registration", "register", "setup_from"]
 
+_DECIDED = 3.0e-3
+"""Distance of the tool [m] by which one of several poses must fit better to be chosen."""
 DOUBTFUL_TOUCHES = 2.0e-3
 """RMS of the touches beyond which a warning is given [m]."""
 
@@ -99,22 +101,8 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
     camera, repairs = None, _repairs(dataset, proposal)
     repair = repairs[0] if repairs else None
     if dataset.has_rest and dataset.observed:
-        config = dataset.config
-        if isinstance(dataset.geometry, Shape):
-            raise RegistrationError(
-                f"{config.surface}: clouds are registered to a block only, not to other shapes "
-                "yet; leave the clouds of this "
-                "dataset out, so that its forces are compared"
-            )
-        if dataset.accepted is not None:
-            camera = accepted_camera_fit(
-                dataset.rest_cloud(), config.size, config.depth_sigma, dataset.accepted
-            )
-        else:
-            camera = fit_camera(
-                dataset.rest_cloud(), config.size, config.depth_sigma, config.to_phantom
-            )
-        report(0.7, "which way round the block lies")
+        camera = _register_camera(dataset)
+        report(0.7, "which way round the phantom lies")
         # An automatic heading follows the tool; a given heading decides between repairs.
         if not camera.automatic:
             repair = choose_repair(dataset, repairs, camera.phantom_from_camera)
@@ -131,7 +119,7 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
         touch_rms=robot.rms,
         phantom_from_camera=camera.phantom_from_camera if camera else Transform(),
         camera_covariance=camera.covariance if camera else np.diag(PRIOR**2),
-        camera_pivot=camera.pivot if camera else np.array([0.0, 0.0, dataset.config.size[2]]),
+        camera_pivot=camera.pivot if camera else np.array([0.0, 0.0, dataset.geometry.height]),
         weak_directions=camera.weak_directions if camera else (),
         warnings=warnings,
         proposal=proposal,
@@ -161,15 +149,23 @@ def setup_from(dataset: Dataset, registration: Registration) -> Setup:
     )
 
 
+def _register_camera(dataset: Dataset) -> CameraFit:
+    """Camera to phantom: as accepted, where a registration was; else from the rest cloud."""
+    cloud, config, accepted = dataset.rest_cloud(), dataset.config, dataset.accepted
+    if accepted is None:
+        return fit_rest_cloud(cloud, dataset.geometry, config.depth_sigma, config.to_phantom)
+    start = accepted.phantom_from_camera
+    fit = refine_rest_cloud(cloud, dataset.geometry, start, config.depth_sigma)
+    return accepted_camera_fit(fit, accepted)
+
+
 def _register_robot(dataset: Dataset) -> tuple[RobotFit, TouchProposal | None]:
     config, touches = dataset.config, dataset.touches
     lift = np.array([0.0, 0.0, config.touch_offset])
     expected = {name: np.asarray(place) + lift for name, place in config.landmarks.items()}
     robot = fit_robot(touches.positions, np.array([expected[name] for name in touches.names]))
-    # Starts beside a rounded body lie within its bounding box and would count as blocked.
-    size = config.size if not isinstance(dataset.geometry, Shape) else None
     return robot, propose_pairing(
-        touches.names, touches.positions, expected, size, _tool_starts(dataset)
+        touches.names, touches.positions, expected, dataset.geometry, _tool_starts(dataset)
     )
 
 
@@ -177,8 +173,7 @@ def _repairs(dataset: Dataset, proposal: TouchProposal | None) -> tuple[Landmark
     config, touches = dataset.config, dataset.touches
     lift = np.array([0.0, 0.0, config.touch_offset])
     expected = np.array([np.asarray(config.landmarks[name]) + lift for name in touches.names])
-    size = config.size if not isinstance(dataset.geometry, Shape) else None
-    repairs = find_repairs(touches.positions, expected, size, _tool_starts(dataset))
+    repairs = find_repairs(touches.positions, expected, dataset.geometry, _tool_starts(dataset))
     if repairs or proposal is None or proposal.scale == 1.0:
         return repairs
     return (resized_repair(touches.positions, expected),)
@@ -218,27 +213,34 @@ def _doubt_tool(dataset: Dataset, camera: CameraFit, misfit: float) -> CameraFit
 def _settle_heading(
     dataset: Dataset, phantom_from_robot: Transform, camera: CameraFit
 ) -> CameraFit:
-    """Choose between the two headings of a plain block by the tool in the clouds.
+    """Choose between poses that fit alike, as a plain block's two headings do, by the tool in the
+    clouds.
 
     A given first guess is not changed; it gets a warning.
     """
-    as_is, turned = tool_misfit(
-        dataset, phantom_from_robot, [camera.phantom_from_camera, camera.turned]
-    )
-    decided = abs(as_is - turned) > 3.0e-3
+    fits = (camera, *camera.alternatives)
+    away = tool_misfit(dataset, phantom_from_robot, [fit.phantom_from_camera for fit in fits])
+    best = int(np.argmin(away))
+    others = np.delete(away, best)
+    decided = bool(others.size) and float(others.min() - away[best]) > _DECIDED
     if not camera.automatic:
-        if decided and turned < as_is:
+        if decided and best:
             doubt = (
-                f"The camera sees the tool {as_is * 1e3:.0f} mm from where the kinematics put it, "
-                f"and {turned * 1e3:.0f} mm "
-                "with the block half a turn about z: the landmarks in touches.csv or [camera] "
-                "to_phantom are half a turn off."
+                f"The camera sees the tool {away[0] * 1e3:.0f} mm from where the kinematics put "
+                f"it, and {away[best] * 1e3:.0f} mm with the phantom "
+                f"{_turned(camera, fits[best])}: the landmarks in touches.csv or [camera] "
+                "to_phantom are off by that."
             )
             return replace(camera, warnings=(*camera.warnings, doubt))
-        return _doubt_tool(dataset, camera, as_is)
+        return _doubt_tool(dataset, camera, float(away[0]))
     if not decided:
         return camera
-    warnings = tuple(text for text in camera.warnings if "half a turn" not in text)
-    if as_is < turned:
-        return replace(camera, warnings=warnings)
-    return replace(turned_fit(camera), warnings=warnings)
+    settled = tuple(text for text in camera.warnings if text != camera.ambiguity)
+    return replace(fits[best], automatic=True, warnings=settled)
+
+
+def _turned(camera: CameraFit, other: CameraFit) -> str:
+    """Words on the turn between two poses of the phantom."""
+    motion = other.phantom_from_camera @ camera.phantom_from_camera.inverse()
+    angle = float(np.degrees(np.linalg.norm(motion.rotation_vector)))
+    return "half a turn about z" if angle > 175.0 else f"turned by {angle:.0f} degrees"

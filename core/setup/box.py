@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, lengths
 from palpate.setup.block_surface import BlockSurface
 from palpate.setup.bounds import require_within
 from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry
@@ -37,6 +37,11 @@ class Box(Geometry):
     def high(self) -> FloatArray:
         """Highest corner (3,) [m]."""
         return np.array([self.size[0] / 2, self.size[1] / 2, self.size[2]])
+
+    @property
+    def is_block(self) -> bool:
+        """Whether top and sides are the faces of a block, see `Geometry.is_block`."""
+        return True
 
     @property
     def volume(self) -> float:
@@ -70,6 +75,15 @@ class Box(Geometry):
             * np.where(side == 2, 1.0, np.sign(points[np.arange(len(points)), side]))[:, None]
         )
         return np.asarray(distance), np.asarray(normals)
+
+    def outside(self, points: FloatArray) -> FloatArray:
+        """Signed distance (m,) [m], see `Geometry.outside`."""
+        half = np.array(self.size) / 2
+        beyond = np.abs(points - np.array([0.0, 0.0, half[2]])) - half
+        x, y, z = beyond.T
+        return np.asarray(
+            lengths(np.maximum(beyond, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
+        )
 
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface."""

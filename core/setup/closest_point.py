@@ -12,6 +12,9 @@ from numba import njit
 
 __all__ = ["containing", "nearest", "winding_number"]
 
+_TIE = 1e-12
+"""Distances that differ by less are equal [m]."""
+
 
 @njit(cache=True)
 def _shares(p: Any, a: Any, b: Any, c: Any) -> tuple[float, float, float]:  # noqa: PLR0911 (one for each corner, edge and the inside)
@@ -46,6 +49,9 @@ def _shares(p: Any, a: Any, b: Any, c: Any) -> tuple[float, float, float]:  # no
 def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
     """Find the nearest of triangles (t, 3, 3) [m] to each point (m, 3) [m].
 
+    Of triangles that meet in the nearest place it is the one that faces the point most: its side
+    tells whether the point is outside.
+
     Returns:
         number (m,) of the triangle, and the nearest point on it (m, 3) [m].
     """
@@ -56,7 +62,7 @@ def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
         middles[t] = (corners[t, 0] + corners[t, 1] + corners[t, 2]) / 3
         reaches[t] = max([np.linalg.norm(corners[t, i] - middles[t]) for i in range(3)])
     for m in range(len(points)):
-        best = np.inf
+        best, most = np.inf, 0.0
         for t in range(len(corners)):
             far = 0.0
             for i in range(3):
@@ -65,9 +71,14 @@ def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
                 continue
             u, v, w = _shares(points[m], corners[t, 0], corners[t, 1], corners[t, 2])
             place = u * corners[t, 0] + v * corners[t, 1] + w * corners[t, 2]
-            distance = float(np.linalg.norm(points[m] - place))
-            if distance < best:
-                best, numbers[m] = distance, t
+            away = points[m] - place
+            distance = float(np.linalg.norm(away))
+            if distance > best + _TIE:
+                continue
+            across = np.cross(corners[t, 1] - corners[t, 0], corners[t, 2] - corners[t, 0])
+            facing = abs(np.dot(away, across)) / max(float(np.linalg.norm(across)), 1e-300)
+            if distance < best - _TIE or facing > most:
+                best, most, numbers[m] = min(distance, best), facing, t
                 places[m] = place
     return numbers, places
 

@@ -48,6 +48,11 @@ class Geometry(ABC):
         return float(self.high[2])
 
     @property
+    def is_block(self) -> bool:
+        """Whether top and sides are the five free faces of a block along the axes."""
+        return False
+
+    @property
     @abstractmethod
     def volume(self) -> float:
         """Enclosed volume [m^3]."""
@@ -67,6 +72,12 @@ class Geometry(ABC):
 
         Returns:
             distances (m,) [m], negative inside, and unit normals (m, 3).
+        """
+
+    @abstractmethod
+    def outside(self, points: FloatArray) -> FloatArray:
+        """Signed distance (m,) [m] of points (m, 3) [m] to the whole surface, base included,
+        positive outside; of a free form interpolated, to about 0.2 mm.
         """
 
     @abstractmethod

@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
+from palpate.setup.distance_grid import DistanceGrid
 from palpate.setup.fixed_region import FixedRegion, Plane
 from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry
 from palpate.setup.shape_surface import ShapeSurface
@@ -138,6 +139,14 @@ class Shape(Geometry):
         a, b, c = self.corners.transpose(1, 0, 2)
         normals = np.cross(b - a, c - a)
         return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+    def outside(self, points: FloatArray) -> FloatArray:
+        """Signed distance (m,) [m], see `Geometry.outside`."""
+        return self._distances(points)
+
+    @cached_property
+    def _distances(self) -> DistanceGrid:
+        return DistanceGrid.of(self.vertices, self.triangles)
 
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""

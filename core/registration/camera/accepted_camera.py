@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.dataset.accepted_registration import AcceptedRegistration
-from palpate.foundation.arrays import FloatArray
-from palpate.registration.camera.camera_fit import CameraFit, refine_camera
+from palpate.registration.camera.camera_fit import CameraFit
 
 __all__ = ["accepted_camera_fit"]
 
@@ -16,21 +15,13 @@ APART = 3.0e-3
 """Distance between the accepted pose and the fit from there beyond which a warning is given [m]."""
 
 
-def accepted_camera_fit(
-    cloud: FloatArray,
-    size: tuple[float, float, float],
-    depth_sigma: float,
-    accepted: AcceptedRegistration,
-) -> CameraFit:
+def accepted_camera_fit(fit: CameraFit, accepted: AcceptedRegistration) -> CameraFit:
     """The accepted pose and its covariance, with statistics of the rest cloud.
 
     Args:
-        cloud: (n, 3) rest cloud [m], camera frame.
-        size: of the block [m].
-        depth_sigma: stated accuracy of depth [m].
+        fit: of the rest cloud from the accepted pose on.
         accepted: the registration.
     """
-    fit = refine_camera(cloud, size, accepted.phantom_from_camera, depth_sigma)
     motion = fit.phantom_from_camera @ accepted.phantom_from_camera.inverse()
     apart = float(np.linalg.norm(motion.apply(fit.pivot) - fit.pivot))
     warnings = list(fit.warnings)

@@ -22,6 +22,10 @@ __all__ = ["CameraFit", "fit_camera", "refine_camera"]
 
 EXPLAINED_LEAST = 0.7
 """Share of points on the stated surface below which a warning is given [1]."""
+_HALF_TURN = (
+    "A plain block looks the same after half a turn: its heading cannot be told from the rest "
+    "cloud; give [camera] to_phantom to settle it."
+)
 LEAST_POINTS = 50
 """Least number of points of a fit."""
 
@@ -46,6 +50,7 @@ class CameraFit:
         explained: share of the points near the block that lie on its stated surface [1].
         automatic: whether the first guess was found, not given.
         warnings: for a person.
+        ambiguity: the warning that other poses fit as well; empty where none does.
         alternatives: of other poses that fit about as well, without alternatives of their own.
     """
 
@@ -63,6 +68,7 @@ class CameraFit:
     explained: float
     automatic: bool
     warnings: tuple[str, ...]
+    ambiguity: str = ""
     alternatives: tuple[CameraFit, ...] = ()
 
     @property
@@ -207,7 +213,7 @@ def _explained(
 ) -> float:
     """Share of points above the table and near the block that lie on its surface [1]."""
     points = pose.apply(cloud)
-    distance = box_distance(points, np.array(size))
+    distance = box_distance(points, size)
     near = (points[:, 2] > 3.0e-3) & (distance < 0.02)
     return (
         float((np.abs(distance[near]) < max(1.5 * depth_sigma, 2.0e-3)).mean())
@@ -260,6 +266,7 @@ def _conclude(
         explained=share,
         automatic=automatic,
         warnings=tuple(_doubts(share, pose, guess, pivot, offsets, last.bias)),
+        ambiguity="" if guess else _HALF_TURN,
     )
 
 
@@ -296,11 +303,7 @@ def _doubts(
             f"(expected over {EXPLAINED_LEAST:.0%}): check [phantom] size and [camera] to_phantom."
         )
     if guess is None:
-        doubts.append(
-            "A plain block looks the same after half a turn: its heading cannot be told from the "
-            "rest cloud; "
-            "give [camera] to_phantom to settle it."
-        )
+        doubts.append(_HALF_TURN)
     else:
         drift = guess @ pose.inverse()
         shift, turn = (

@@ -10,8 +10,8 @@ from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.camera.camera_fit import CameraFit
-from palpate.registration.faces import box_distance
 from palpate.registration.uncertainty import weak_directions
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["tool_misfit", "turned_fit"]
 
@@ -32,7 +32,7 @@ def tool_misfit(
     NaN where no frame shows a tool. Distances are limited to 30 mm.
     """
     distances = [
-        _frame_misfits(cloud, centre, dataset.config.size, headings)
+        _frame_misfits(cloud, centre, dataset.geometry, headings)
         for cloud, centre in _frames(dataset, phantom_from_robot)
     ]
     known = [row for row in distances if np.isfinite(row).all()]
@@ -50,7 +50,7 @@ def _frames(dataset: Dataset, phantom_from_robot: Transform) -> list[tuple[Float
             continue
         centres = phantom_from_robot.apply(sequence.kinematics.position_at(sequence.cloud_times))
         aside = np.linalg.norm(centres[:, :2], axis=1)
-        near = box_distance(centres, np.array(dataset.config.size)) < 0.03
+        near = dataset.geometry.outside(centres) < 0.03
         index = int(np.argmax(np.where(near, aside, -1.0)))
         places.append((float(aside[index]), name, index, centres[index]))
     places.sort(key=lambda place: -place[0])
@@ -60,15 +60,12 @@ def _frames(dataset: Dataset, phantom_from_robot: Transform) -> list[tuple[Float
 
 
 def _frame_misfits(
-    cloud: FloatArray,
-    centre: FloatArray,
-    size: tuple[float, float, float],
-    headings: list[Transform],
+    cloud: FloatArray, centre: FloatArray, geometry: Geometry, headings: list[Transform]
 ) -> FloatArray:
     found = []
     for heading in headings:
         points = heading.apply(cloud)
-        apart = box_distance(points, np.array(size))
+        apart = geometry.outside(points)
         tool = points[(apart > ASIDE) & (apart < 0.15) & (points[:, 2] > ASIDE)]
         if len(tool) < 10:
             return np.full(len(headings), np.nan)

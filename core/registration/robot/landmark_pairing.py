@@ -13,8 +13,8 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.faces import box_distance
 from palpate.registration.robot.robot_fit import rigid_fits, similarity
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = [
     "CLEARLY_BETTER",
@@ -59,7 +59,7 @@ def propose_pairing(
     names: Sequence[str],
     touches: FloatArray,
     expected: dict[str, FloatArray],
-    size: tuple[float, float, float] | None = None,
+    geometry: Geometry | None = None,
     tool_starts: FloatArray | None = None,
 ) -> TouchProposal | None:
     """Search for a much better pairing of the touches, then for another size of their polygon.
@@ -68,10 +68,10 @@ def propose_pairing(
         names: the landmark stated for each touch.
         touches: (n, 3) [m], robot frame.
         expected: tool centre (3,) [m] at each landmark, phantom frame.
-        size: of the phantom [m].
+        geometry: of the phantom.
         tool_starts: (k, 3) positions of the tool before any touch [m], robot frame. Corners of one
-            plane fit equally well upside down; starts inside the block or under the table rule that
-            out.
+            plane fit equally well upside down; starts inside the phantom or under the table rule
+            that out.
 
     Returns:
         the proposal; None where the statement fits best.
@@ -83,7 +83,7 @@ def propose_pairing(
     rotations, translations, rms = rigid_fits(touches, corners[orders[:, rows]])
     blocked = np.array(
         [
-            blocked_share(tool_starts, size, Transform(r, t))
+            blocked_share(tool_starts, geometry, Transform(r, t))
             for r, t in zip(rotations, translations, strict=True)
         ]
     )
@@ -124,19 +124,14 @@ def _orders(count: int) -> Iterator[tuple[int, ...]]:
 
 
 def blocked_share(
-    tool_starts: FloatArray | None,
-    size: tuple[float, float, float] | None,
-    phantom_from_robot: Transform,
+    tool_starts: FloatArray | None, geometry: Geometry | None, phantom_from_robot: Transform
 ) -> float:
-    """Share of the starts [1] that are impossible: inside the block, or under the table."""
-    if tool_starts is None or size is None or len(tool_starts) == 0:
+    """Share of the starts [1] that are impossible: inside the phantom, or under the table."""
+    if tool_starts is None or geometry is None or len(tool_starts) == 0:
         return 0.0
     points = phantom_from_robot.apply(tool_starts)
     return float(
-        (
-            (box_distance(points, np.asarray(size)) < -CLEARLY_BETTER)
-            | (points[:, 2] < -CLEARLY_BETTER)
-        ).mean()
+        ((geometry.outside(points) < -CLEARLY_BETTER) | (points[:, 2] < -CLEARLY_BETTER)).mean()
     )
 
 

@@ -24,6 +24,7 @@ from palpate.registration.robot.landmark_pairing import (
     blocked_share,
 )
 from palpate.registration.robot.robot_fit import RobotFit, fit_robot, similarity
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import PAIRINGS, Touching
 
 __all__ = ["LandmarkRepair", "choose_repair", "find_repairs", "pairings_for", "resized_repair"]
@@ -68,7 +69,7 @@ def pairings_for(count: int) -> tuple[str, ...]:
 def find_repairs(
     touches: FloatArray,
     expected: FloatArray,
-    size: tuple[float, float, float] | None = None,
+    geometry: Geometry | None = None,
     tool_starts: FloatArray | None = None,
 ) -> tuple[LandmarkRepair, ...]:
     """Find pairings that fit the touches much better than the stated one, best first.
@@ -76,14 +77,14 @@ def find_repairs(
     Args:
         touches: (n, 3) [m], robot frame.
         expected: (n, 3) tool centre at each touch's stated landmark [m], phantom frame.
-        size: of the phantom [m].
+        geometry: of the phantom.
         tool_starts: (k, 3) positions of the tool before any touch [m], robot frame.
     """
     found = []
     for pairing in pairings_for(len(touches)):
         scale, rms, fit = _fit(touches, expected[Touching(pairing=pairing).order(len(touches))])
         found.append(
-            (pairing, scale, fit, rms, blocked_share(tool_starts, size, fit.phantom_from_robot))
+            (pairing, scale, fit, rms, blocked_share(tool_starts, geometry, fit.phantom_from_robot))
         )
     stated, lies = found[0][3], found[0][4]
     possible = [row for row in found if row[4] < IMPOSSIBLE or row[4] <= 0.5 * lies]

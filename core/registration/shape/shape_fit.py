@@ -23,6 +23,8 @@ __all__ = ["fit_shape_camera", "refine_shape_camera"]
 
 _POOR = 1.3
 """Misfit of depth from which on the plane that was found may be no table [variances]."""
+_FAR = 15e-3
+"""Distance of the fit from a guess beyond which a warning is given [m]."""
 _LARGER = 1.1
 """Least extent of a table over the body's [1]."""
 _ALIKE = 6.0
@@ -183,7 +185,7 @@ def _away(pose: Transform, other: Transform, body: SeenBody) -> float:
 def _with_doubts(
     best: CameraFit, others: list[CameraFit], guess: Transform | None, body: SeenBody
 ) -> CameraFit:
-    doubts = []
+    doubts, ambiguity = [], ""
     if best.explained < EXPLAINED_LEAST:
         doubts.append(
             f"Only {best.explained:.0%} of the rest cloud's points that may be the phantom's lie "
@@ -191,15 +193,20 @@ def _with_doubts(
             "and its unit, and [camera] to_phantom."
         )
     if others and guess is None:
-        doubts.append(
+        ambiguity = (
             f"The phantom looks alike in {len(others) + 1} poses: which one is right cannot be "
             "told from the rest cloud; give [camera] to_phantom, or register by clicks."
         )
-    if guess is not None and (away := _away(best.phantom_from_camera, guess, body)) > 0.015:
+        doubts.append(ambiguity)
+    if guess is not None and (away := _away(best.phantom_from_camera, guess, body)) > _FAR:
         doubts.append(
             f"The fit lies {away * 1e3:.1f} mm from [camera] to_phantom, turns counted at the "
             "phantom's rim: check that guess."
         )
     return replace(
-        best, automatic=guess is None, warnings=tuple(doubts), alternatives=tuple(others)
+        best,
+        automatic=guess is None,
+        warnings=tuple(doubts),
+        ambiguity=ambiguity,
+        alternatives=tuple(others),
     )

@@ -11,8 +11,10 @@ from palpate.measurement.tool_pose import ToolPose, ToolShaft, find_shaft, tool_
 from palpate.registration.faces import box_distance
 from palpate.registration.pose import small_motion
 from palpate.registration.registration import register
+from palpate.setup.box import Box
 
 SIZE = (0.0687, 0.0393, 0.0358)
+PHANTOM = Box(size=SIZE)
 RADIUS = 4e-3
 """Of the shaft of a scene [m]."""
 TABLE, BLOCK, SPHERE, SHAFT, STRAY = range(5)
@@ -21,9 +23,9 @@ TILTED = np.array([0.3, 0.2, 0.93]) / np.linalg.norm([0.3, 0.2, 0.93])
 
 
 def cleaned(view, tool=None, noise: float = 7e-4) -> CleanCloud:
-    return Cleaner(size=SIZE, phantom_from_camera=view.pose, tool_radius=0.005, noise=noise).clean(
-        view.cloud, tool
-    )
+    return Cleaner(
+        geometry=PHANTOM, phantom_from_camera=view.pose, tool_radius=0.005, noise=noise
+    ).clean(view.cloud, tool)
 
 
 def kept(found: CleanCloud, label: np.ndarray, what: int) -> float:
@@ -69,7 +71,7 @@ def test_points_of_a_side_above_the_lowest_height_have_no_bias(scene):
     )
     away = (foot - camera) / np.linalg.norm(foot - camera, axis=1)[:, None]
     off = noise * random.standard_normal(len(foot))
-    cleaner = Cleaner(size=SIZE, phantom_from_camera=pose, tool_radius=0.005, noise=noise)
+    cleaner = Cleaner(geometry=PHANTOM, phantom_from_camera=pose, tool_radius=0.005, noise=noise)
     found = cleaner.clean(pose.inverse().apply(foot + off[:, None] * away)).indices
     above = foot[found, 2] > cleaner.lowest
     assert abs(off[found][above].mean()) < 4 * noise / np.sqrt(above.sum())
@@ -108,7 +110,10 @@ def test_a_camera_bumped_after_its_registration_still_separates_table_and_block(
 
 def test_an_empty_cloud_gives_an_empty_one(scene):
     cleaner = Cleaner(
-        size=SIZE, phantom_from_camera=scene().look(seed=7).pose, tool_radius=0.005, noise=7e-4
+        geometry=PHANTOM,
+        phantom_from_camera=scene().look(seed=7).pose,
+        tool_radius=0.005,
+        noise=7e-4,
     )
     found = cleaner.clean(np.empty((0, 3)), ToolPose(np.zeros(3), ToolShaft(UP, RADIUS)))
     assert found.points.shape == (0, 3) and sum(found.counts.values()) == 0
@@ -135,7 +140,7 @@ def test_kept_points_beside_the_shaft_have_no_bias(scene):
 def test_tool_of_another_size_than_stated_goes_if_its_size_is_allowed(scene):
     centre = np.array([0.008, -0.004, SIZE[2] + 0.003])
     view = scene(tool=tuple(centre), pixels=150).look(seed=2)
-    stated = Cleaner(size=SIZE, phantom_from_camera=view.pose, tool_radius=2e-3, noise=4e-4)
+    stated = Cleaner(geometry=PHANTOM, phantom_from_camera=view.pose, tool_radius=2e-3, noise=4e-4)
     tool = ToolPose(centre, ToolShaft(UP, RADIUS))
     assert kept(stated.clean(view.cloud, tool), view.label, SPHERE) > 0.1
     found = stated.allowing(5e-3).clean(view.cloud, tool)
@@ -167,7 +172,7 @@ def test_measured_datasets_keep_the_block_and_little_else(measured_datasets):
 def test_parts_of_the_tool_beyond_its_stated_size_go_where_they_stand_clear(scene):
     centre = np.array([0.008, -0.004, SIZE[2] + 0.006])
     view = scene(tool=tuple(centre), tool_radius=7e-3, pixels=150).look(seed=3)
-    cleaner = Cleaner(size=SIZE, phantom_from_camera=view.pose, tool_radius=5e-3, noise=4e-4)
+    cleaner = Cleaner(geometry=PHANTOM, phantom_from_camera=view.pose, tool_radius=5e-3, noise=4e-4)
     found = cleaner.clean(view.cloud, ToolPose(centre, ToolShaft(UP, RADIUS)))
     heights = view.pose.apply(view.cloud)[:, 2] - SIZE[2]
     clear = np.flatnonzero((view.label == SPHERE) & (heights > 3e-3))

@@ -9,6 +9,7 @@ from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.registration.point_pairs import directions, fit_pairs, register_pairs
 from palpate.registration.pose import small_motion
+from palpate.setup.box import Box
 
 SIZE = (0.0687, 0.0393, 0.0358)
 TOP = np.array([0.0, 0.0, SIZE[2]])
@@ -72,7 +73,7 @@ def test_sloppy_clicks_and_icp_arrive_at_the_pose(scene):
     view = scene().look(seed=3)
     rng = np.random.default_rng(1)
     clicked = view.pose.inverse().apply(MESH[:3]) + rng.normal(0, 2e-3, (3, 3))
-    result = register_pairs(view.cloud, SIZE, clicked, MESH[:3])
+    result = register_pairs(view.cloud, Box(size=SIZE), clicked, MESH[:3])
     off = view.pose @ result.camera.phantom_from_camera.inverse()
     assert np.linalg.norm(off.apply(TOP) - TOP) < 5e-4
     assert np.degrees(np.linalg.norm(off.rotation_vector)) < 0.5
@@ -91,7 +92,7 @@ def test_a_start_by_hand_keeps_its_heading(scene):
     view = scene().look(seed=4)
     turned = Transform(np.diag([-1.0, -1.0, 1.0])) @ view.pose
     clicked = turned.inverse().apply(MESH[:3])
-    found = register_pairs(view.cloud, SIZE, clicked, MESH[:3]).camera.phantom_from_camera
+    found = register_pairs(view.cloud, Box(size=SIZE), clicked, MESH[:3]).camera.phantom_from_camera
     assert np.degrees(np.linalg.norm((turned @ found.inverse()).rotation_vector)) < 0.5
 
 
@@ -105,6 +106,6 @@ def test_directions_come_weakest_first_with_their_names():
 def test_the_start_is_not_doubted_as_a_stated_guess(scene):
     view = scene().look(seed=6)
     start = small_motion(np.array([0.016, 0.0, 0.0, 0.0, 0.0, 0.0]), TOP) @ view.pose
-    result = register_pairs(view.cloud, SIZE, start.inverse().apply(MESH), MESH)
+    result = register_pairs(view.cloud, Box(size=SIZE), start.inverse().apply(MESH), MESH)
     assert not any("from [camera] to_phantom" in text for text in result.to_json()["warnings"])
     assert result.moved[0] == pytest.approx(0.016, abs=5e-4)

@@ -23,7 +23,9 @@ from palpate.replay.replay import rest
 from palpate.setup.box import Box
 from palpate.setup.setup import Sensor
 
-CLEANER = Cleaner(size=SIZE, phantom_from_camera=POSE, tool_radius=5e-3, noise=4e-4)
+BLOCK = Box(size=SIZE)
+
+CLEANER = Cleaner(geometry=BLOCK, phantom_from_camera=POSE, tool_radius=5e-3, noise=4e-4)
 FRAMES, RATE = 41, 20.0
 
 

@@ -26,7 +26,10 @@ from palpate.mesh.box_mesh import GridSpec
 from palpate.registration.registration import Registration
 from palpate.registration.robot.landmark_repair import find_repairs
 from palpate.registration.robot.robot_fit import fit_robot
+from palpate.setup.box import Box
 from palpate.setup.setup import Setup, Touching
+
+BLOCK = Box(size=SIZE)
 
 STATED = replace(SETUP, landmarks=CORNERS, touching=Touching(lift=5e-3))
 LIFT, NOISE = np.array([0.0, 0.0, 5e-3]), 4e-4
@@ -75,7 +78,7 @@ def _at_rest(setup: Setup) -> RestEvidence:
         * cloud
         / np.linalg.norm(cloud, axis=1)[:, None]
     )
-    cleaner = Cleaner(size=SIZE, phantom_from_camera=POSE, tool_radius=5e-3, noise=NOISE)
+    cleaner = Cleaner(geometry=BLOCK, phantom_from_camera=POSE, tool_radius=5e-3, noise=NOISE)
     return RestEvidence(RestCloud.of(cloud, cleaner, setup, GRID))
 
 

@@ -6,9 +6,11 @@ import pytest
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.robot.landmark_repair import find_repairs, pairings_for, resized_repair
+from palpate.setup.box import Box
 from palpate.setup.setup import PAIRINGS, Touching
 
 SIZE = (0.0687, 0.0393, 0.0358)
+BLOCK = Box(size=SIZE)
 CORNERS = np.array(
     [[x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
 )
@@ -36,7 +38,7 @@ def _off(fit: Transform) -> float:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_right_touches_stay_as_they_are(seed: int):
-    assert find_repairs(_touches(seed=seed), CORNERS, SIZE, STARTS) == ()
+    assert find_repairs(_touches(seed=seed), CORNERS, BLOCK, STARTS) == ()
 
 
 @pytest.mark.parametrize(
@@ -45,7 +47,7 @@ def test_right_touches_stay_as_they_are(seed: int):
 def test_robot_is_found_where_it_is_though_corners_were_swapped_and_the_polygon_is_small(
     pairing: str,
 ):
-    found = find_repairs(_touches(pairing, 0.86, 1e-3), CORNERS, SIZE, STARTS)
+    found = find_repairs(_touches(pairing, 0.86, 1e-3), CORNERS, BLOCK, STARTS)
     right = [one for one in found if one.pairing == pairing]
     assert right and _off(right[0].fit.phantom_from_robot) < 6e-4
     assert right[0].scale == pytest.approx(0.82, abs=0.03) and right[0].fit.sigma < 1e-3
@@ -59,7 +61,7 @@ def test_robot_is_found_where_it_is_though_corners_were_swapped_and_the_polygon_
 
 def test_polygon_of_another_size_alone_moves_nothing_and_is_known_better():
     touches = _touches(scale=0.86)
-    assert find_repairs(touches, CORNERS, SIZE, STARTS) == ()
+    assert find_repairs(touches, CORNERS, BLOCK, STARTS) == ()
     found = resized_repair(touches, CORNERS)
     assert found.pairing == "as-paired" and found.scale == pytest.approx(0.86, abs=0.01)
     assert _off(found.fit.phantom_from_robot) < 6e-4 and found.fit.sigma < 5e-4

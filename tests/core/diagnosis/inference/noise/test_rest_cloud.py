@@ -17,7 +17,10 @@ from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.segmentation import Cleaner
 from palpate.registration.pose import small_motion
 from palpate.replay.replay import rest
+from palpate.setup.box import Box
 from palpate.setup.setup import Load, Setup
+
+BLOCK = Box(size=SIZE)
 
 SAG, NOISE, STEP = 1.5, 4e-4, 1e-3
 PIVOT = np.array([0.0, 0.0, TOP])
@@ -39,7 +42,7 @@ def _cloud(truth: Setup, seed: int) -> FloatArray:
 
 
 def _channel(truth: Setup, pose: Transform = POSE) -> RestCloud:
-    cleaner = Cleaner(size=SIZE, phantom_from_camera=pose, tool_radius=5e-3, noise=NOISE)
+    cleaner = Cleaner(geometry=BLOCK, phantom_from_camera=pose, tool_radius=5e-3, noise=NOISE)
     return RestCloud.of(
         _cloud(truth, seed=0), cleaner, replace(SETUP, phantom_from_camera=pose), GRID
     )

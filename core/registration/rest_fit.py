@@ -1,0 +1,49 @@
+"""Camera to phantom from the rest cloud, for a phantom of any shape.
+
+The faces of a block determine its pose more finely than a search over a free form does, which
+serves every other shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.frames import Transform
+from palpate.registration.camera.camera_fit import CameraFit, fit_camera, refine_camera
+from palpate.registration.camera.heading import turned_fit
+from palpate.registration.shape.shape_fit import fit_shape_camera, refine_shape_camera
+from palpate.setup.phantom_geometry import Geometry
+
+__all__ = ["fit_rest_cloud", "refine_rest_cloud"]
+
+
+def fit_rest_cloud(
+    cloud: FloatArray, geometry: Geometry, depth_sigma: float, guess: Transform | None = None
+) -> CameraFit:
+    """Register a raw rest cloud to a phantom; its `alternatives` fit about as well.
+
+    Args:
+        cloud: (n, 3) [m], camera frame.
+        geometry: of the phantom.
+        depth_sigma: stated accuracy of depth [m].
+        guess: phantom_from_camera; None without.
+
+    Raises RegistrationError where that is impossible.
+    """
+    if not geometry.is_block:
+        return fit_shape_camera(cloud, geometry, depth_sigma, guess)
+    fit = fit_camera(cloud, geometry.size, depth_sigma, guess)
+    return replace(fit, alternatives=(turned_fit(fit),))
+
+
+def refine_rest_cloud(
+    cloud: FloatArray, geometry: Geometry, start: Transform, depth_sigma: float
+) -> CameraFit:
+    """Register a raw rest cloud from `start` (phantom_from_camera) alone, without a search.
+
+    Args and errors are those of `fit_rest_cloud`.
+    """
+    if geometry.is_block:
+        return refine_camera(cloud, geometry.size, start, depth_sigma)
+    return refine_shape_camera(cloud, geometry, start, depth_sigma)

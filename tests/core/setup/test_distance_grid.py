@@ -1,0 +1,30 @@
+"""Signed distances on a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.setup.box import Box
+from palpate.synthetic.bench.shape_families import draw_shape
+
+
+def test_distances_to_a_free_form_are_interpolated_to_a_fifth_of_a_millimetre() -> None:
+    body = draw_shape("kidney", 0)
+    random = np.random.default_rng(0)
+    points = random.uniform(body.low - 0.015, body.high + 0.015, (300, 3))
+    exact, _ = body.facing(points)
+    apart = body.outside(points) - np.sign(exact) * np.abs(exact)
+    assert np.abs(apart).max() < 0.4e-3 and np.sqrt((apart**2).mean()) < 0.2e-3
+
+
+def test_far_points_are_farther_than_the_grid_reaches() -> None:
+    body = draw_shape("dome", 0)
+    far = np.array([[0.5, 0.0, 0.01], [0.0, 0.0, 1.0]])
+    found = body.outside(far)
+    assert (found > 0.4).all() and (np.abs(found - body.distance(far)) < 0.02).all()
+
+
+def test_block_knows_its_distance_exactly() -> None:
+    block = Box(size=(0.06, 0.04, 0.03))
+    places = np.array([[0.0, 0.0, 0.04], [0.03, 0.02, 0.05], [0.0, 0.0, 0.02], [0.0, 0.0, -0.01]])
+    assert np.allclose(block.outside(places), [0.01, 0.02, -0.01, 0.01])
