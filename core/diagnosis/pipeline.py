@@ -46,10 +46,10 @@ from palpate.diagnosis.validation.stiffness_error_test import largest_stiffness_
 from palpate.experiment import Experiment
 from palpate.foundation.errors import RunError
 from palpate.foundation.progress import Report, part, rising, silent
-from palpate.mesh.graded_mesh import PAGE_GRID, REPLAY_GRID
-from palpate.mesh.push_meshes import REPLAY_PUSHES
+from palpate.mesh.default_meshes import Use, default_spec
+from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
-from palpate.setup.setup import Sensor, Setup, Shape
+from palpate.setup.setup import Sensor, Setup
 
 __all__ = ["diagnose"]
 
@@ -292,5 +292,4 @@ def _model(dataset: Dataset, setup: Setup, findings: Findings, fitted: list[str]
 
 def _described(setup: Setup) -> dict[str, Any]:
     """Return the mesh of the model as plain values."""
-    spec = REPLAY_PUSHES if isinstance(setup.geometry, Shape) else REPLAY_GRID
-    return asdict(spec.for_tool(setup.tool.radius))
+    return asdict(default_spec(Use.REPLAY, setup.geometry, setup.tool.radius))

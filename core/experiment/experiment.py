@@ -30,13 +30,12 @@ from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import Cleaner, cleaner_for
 from palpate.measurement.tool_pose import ToolShaft, find_shaft
 from palpate.measurement.touch_correction import touch_correction
-from palpate.mesh.graded_mesh import REPLAY_GRID
+from palpate.mesh.default_meshes import Use, default_mesh
 from palpate.mesh.protocol import Meshing
-from palpate.mesh.push_meshes import REPLAY_PUSHES
 from palpate.registration.registration import Registration, setup_from
 from palpate.registration.registration import register as relate_frames
 from palpate.replay.replay import replay
-from palpate.setup.setup import Sensor, Setup, Shape
+from palpate.setup.setup import Sensor, Setup
 
 __all__ = ["Experiment", "register", "sequences_with_clouds"]
 
@@ -134,10 +133,7 @@ class Experiment:
 
     def grid(self, centres: FloatArray) -> Meshing:
         """The mesh of a replay of tool centres (f, 3) [m], phantom frame."""
-        radius = self.setup.tool.radius
-        if isinstance(self.setup.geometry, Shape):
-            return REPLAY_PUSHES.for_tool(radius).at(centres)
-        return REPLAY_GRID.for_tool(radius)
+        return default_mesh(Use.REPLAY, self.setup.geometry, self.setup.tool.radius, centres)
 
     def observe(
         self,

@@ -112,26 +112,18 @@ class InteractiveReplay:
         """The nearest permitted position (3,) [m]: not below the base, not too deep, not too far
         away.
         """
-        low, high = self.setup.box.low, self.setup.box.high
-        radius, deepest = self.setup.tool.radius, DEEPEST * float(np.min(self.setup.box.size))
+        geometry, radius = self.setup.geometry, self.setup.tool.radius
+        low, high, deepest = geometry.low, geometry.high, DEEPEST * float(np.min(geometry.size))
         place = np.clip(np.asarray(centre, dtype=float), low - _FAR, high + _FAR)
         place[2] = max(place[2], radius)
         apart, outwards = self._apart(place)
         return np.asarray(place + max(0.0, radius - deepest - apart) * outwards)
 
     def _apart(self, place: FloatArray) -> tuple[float, FloatArray]:
-        """Signed distance [m] of a point (3,) to the block, and the direction (3,) in which it
+        """Signed distance [m] of a point (3,) to the phantom, and the direction (3,) in which it
         grows.
 
-        The base does not count as a side.
+        The base of a block does not count as a side.
         """
-        low, high = self.setup.box.low - np.array([0.0, 0.0, 1.0]), self.setup.box.high
-        outside = place - np.clip(place, low, high)
-        apart = float(np.linalg.norm(outside))
-        if apart > 0:
-            return apart, outside / apart
-        gaps = np.concatenate([place - low, high - place])
-        nearest = int(gaps.argmin())
-        direction = np.zeros(3)
-        direction[nearest % 3] = -1.0 if nearest < 3 else 1.0
-        return -float(gaps[nearest]), direction
+        distance, normal = self.setup.geometry.facing(place[None])
+        return float(distance[0]), normal[0]

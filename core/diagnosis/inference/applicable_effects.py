@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.effects import CATALOGUE, Effect, Measurement
-from palpate.setup.setup import Box, Setup
+from palpate.setup.setup import Setup
 
 __all__ = ["applicable_effects"]
 
@@ -22,7 +22,7 @@ def applicable_effects(
         catalogue: to choose from.
     """
     made = {Measurement.CLOUDS: clouds, Measurement.FORCES: forces}
-    box = isinstance(setup.geometry, Box)
+    box = setup.geometry.is_block
     return tuple(
         kind
         for kind in catalogue

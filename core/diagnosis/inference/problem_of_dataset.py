@@ -10,10 +10,9 @@ from palpate.diagnosis.inference.noise.rest_evidence import RestEvidence
 from palpate.diagnosis.observation.force_only import pushed_places
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.experiment import Experiment
-from palpate.mesh.graded_mesh import FINE_GRID, REPLAY_GRID, SCREEN_GRID
+from palpate.mesh.default_meshes import Use, default_mesh
 from palpate.mesh.protocol import Meshing
-from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES
-from palpate.setup.setup import Setup, Shape
+from palpate.setup.setup import Setup
 
 __all__ = ["problem_of_dataset"]
 
@@ -51,14 +50,9 @@ def problem_of_dataset(
 def _meshes(setup: Setup, data: Sequence[Observations]) -> tuple[Meshing, Meshing, Meshing]:
     """Return the mesh of the diagnosis, the fine one and the coarse one."""
     radius = setup.tool.radius
-    if not isinstance(setup.geometry, Shape):
-        return (
-            REPLAY_GRID.for_tool(radius),
-            FINE_GRID.for_tool(radius),
-            SCREEN_GRID.for_tool(radius),
-        )
     places = pushed_places(data, setup)[0]
     default, fine, coarse = (
-        spec.for_tool(radius).at(places) for spec in (REPLAY_PUSHES, FINE_PUSHES, SCREEN_PUSHES)
+        default_mesh(use, setup.geometry, radius, places)
+        for use in (Use.REPLAY, Use.FINE, Use.SCREEN)
     )
     return default, fine, coarse
