@@ -21,6 +21,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.threads import on_one_thread
 from palpate.registration.faces import FACES, Assignment, IndexArray
 from palpate.registration.pose import motion_jacobian
 
@@ -152,6 +153,7 @@ def _patch_of(found: Assignment) -> IndexArray:
     return np.asarray(np.unique(cells, axis=0, return_inverse=True)[1]).ravel()
 
 
+@on_one_thread
 def estimate(patches: Patches) -> PoseEstimate:
     """Estimate the motion that remains after a fit, with a covariance that includes smooth sensor
     bias and offsets of the block's faces.
