@@ -168,8 +168,9 @@ class ManualRegistration:
         pose = self._start[1] if shown.pose is None else Transform.from_matrix(shown.pose)
         if shown.over:
             return pose
-        low, high = middle_of(pose.apply(phantom.cloud), 0.8 * max(phantom.size))
-        aside = np.array([phantom.size[0] / 2 + APART - low[0], -(low[1] + high[1]) / 2, 0.0])
+        low, high = middle_of(pose.apply(phantom.cloud), 0.8 * max(phantom.geometry.size))
+        right = float(phantom.geometry.high[0])
+        aside = np.array([right + APART - low[0], -(low[1] + high[1]) / 2, 0.0])
         return Transform(np.eye(3), aside) @ pose
 
     def _picture(self, phantom: Phantom, shown: RegistrationView) -> PairPicture:
@@ -187,7 +188,7 @@ class ManualRegistration:
                     marks.append(Mark(number, side, ends[side], shown.chosen == (number, side)))
             if len(ends) == 2:
                 lines.append((ends["cloud"], ends["mesh"], number))
-        names = tuple(phantom.landmarks)
+        names, top = tuple(phantom.landmarks), np.array([0.0, 0.0, phantom.geometry.height])
         return PairPicture(
             cloud=pose.apply(phantom.cloud),
             vertices=phantom.vertices,
@@ -195,9 +196,7 @@ class ManualRegistration:
             landmarks=np.array([phantom.landmarks[name] for name in names]).reshape(-1, 3),
             names=names,
             marks=tuple(marks),
-            arrows=tuple(_arrow(one, np.array([0.0, 0.0, phantom.size[2]])) for one in shown.weak)
-            if shown.over
-            else (),
+            arrows=tuple(_arrow(one, top) for one in shown.weak) if shown.over else (),
             over=shown.over,
             lines=tuple(lines),
         )

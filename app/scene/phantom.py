@@ -16,6 +16,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.camera.levelling import as_seen, levelled
 from palpate.registration.faces import IndexArray
+from palpate.setup.phantom_geometry import Geometry
 
 if TYPE_CHECKING:
     from palpate.dataset import Dataset
@@ -33,32 +34,25 @@ class Phantom:
 
     Attributes:
         cloud: (n, 3) rest cloud as it is drawn [m], camera frame.
-        size: edge lengths of the block [m].
+        geometry: of the phantom.
         landmarks: places by name [m], phantom frame.
         stated: initial guess of phantom_from_camera in dataset.toml; None where there is none.
     """
 
     cloud: FloatArray
-    size: tuple[float, float, float]
+    geometry: Geometry
     landmarks: dict[str, tuple[float, float, float]]
     stated: Transform | None
 
     @property
     def vertices(self) -> FloatArray:
-        """(8, 3) corners of the block [m]."""
-        x, y, z = self.size
-        return np.array(
-            [[i * x / 2, j * y / 2, k * z] for i in (-1, 1) for j in (-1, 1) for k in (0, 1)]
-        )
+        """(v, 3) vertices of the phantom's whole surface [m]."""
+        return self.geometry.closed_surface[0]
 
     @property
     def faces(self) -> IndexArray:
-        """(12, 3) triangles of the block with outward normals."""
-        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-        return np.array(
-            [[a, b, c] for q in quads for a, b, c in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))],
-            dtype=np.int64,
-        )
+        """(t, 3) triangles with outward normals."""
+        return self.geometry.closed_surface[1].astype(np.int64)
 
     def start(self, kind: str) -> Transform:
         """phantom_from_camera for drawing the cloud before any pair is clicked."""
@@ -76,7 +70,7 @@ class Phantoms:
         self._shared: WeakValueDictionary[tuple[str, bytes, str], Phantom] = WeakValueDictionary()
 
     def open(self, name: str) -> Phantom:
-        """Rest cloud and block of one dataset; RegistrationError where it cannot be registered."""
+        """Phantom and rest cloud of one dataset; RegistrationError where there is no such cloud."""
         with self._lock:
             folder = self._library.path(name)
             dataset = self._library.open(name)
@@ -91,4 +85,4 @@ class Phantoms:
 def _read(dataset: Dataset) -> Phantom:
     cloud, config = dataset.rest_cloud(), dataset.config
     drawn = cloud[:: 1 + (len(cloud) - 1) // MOST_DRAWN].copy() if len(cloud) else cloud
-    return Phantom(drawn, config.size, dict(config.landmarks), config.to_phantom)
+    return Phantom(drawn, dataset.geometry, dict(config.landmarks), config.to_phantom)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray, lengths
+from palpate.foundation.arrays import FloatArray, IntArray, lengths
 from palpate.setup.block_surface import BlockSurface
 from palpate.setup.bounds import require_within
 from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry
@@ -84,6 +84,14 @@ class Box(Geometry):
         return np.asarray(
             lengths(np.maximum(beyond, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
         )
+
+    @property
+    def closed_surface(self) -> tuple[FloatArray, IntArray]:
+        """The eight corners [m] and twelve triangles, see `Geometry.closed_surface`."""
+        corners = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        halves = [half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))]
+        return np.where(np.array(corners) == 1, self.high, self.low), np.array(halves)
 
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface."""

@@ -80,6 +80,13 @@ class Geometry(ABC):
         positive outside; of a free form interpolated, to about 0.2 mm.
         """
 
+    @property
+    @abstractmethod
+    def closed_surface(self) -> tuple[FloatArray, IntArray]:
+        """Vertices (v, 3) [m] and triangles (t, 3) of the whole surface, counter-clockwise from
+        outside.
+        """
+
     @abstractmethod
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""

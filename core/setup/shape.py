@@ -148,6 +148,11 @@ class Shape(Geometry):
     def _distances(self) -> DistanceGrid:
         return DistanceGrid.of(self.vertices, self.triangles)
 
+    @property
+    def closed_surface(self) -> tuple[FloatArray, IntArray]:
+        """Vertices [m] and triangles as stated, see `Geometry.closed_surface`."""
+        return self.vertices, self.triangles
+
     def surface_points(self) -> FloatArray:
         """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""
         corners = self.corners[~self.held]

@@ -18,6 +18,7 @@ from small_dataset import SIZE, ply_bytes, write_valid_dataset
 from palpate.app.scene.phantom import Phantom
 from palpate.app.settings import Settings
 from palpate.foundation.frames import Transform
+from palpate.setup.box import Box
 from palpate.synthetic.bench.depth_camera import CameraScene, place_camera
 
 pytestmark = NEEDS_CHROMIUM
@@ -29,7 +30,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Transform]:
     folder = tmp_path_factory.mktemp("by-hand")
     write_valid_dataset(folder / "datasets" / "small")
     rng = np.random.default_rng(5)
-    block = Phantom(np.zeros((1, 3)), SIZE, {}, None)
+    block = Phantom(np.zeros((1, 3)), Box(size=SIZE), {}, None)
     surface = (block.vertices, block.faces)
     camera = place_camera(rng, SIZE, surface, np.array([1.0, -1.0]), 2600, 0.7e-3)
     cloud = camera.cloud(CameraScene(surface, None, np.array([0.0, 0.0, -1.0]), 1.0), rng)

@@ -17,6 +17,7 @@ from palpate.app.scene.registration_scene import Ray
 from palpate.app.schemas import RegistrationView
 from palpate.foundation.frames import Transform
 from palpate.registration.pose import small_motion
+from palpate.setup.box import Box
 
 POSE = Transform.from_vector([0.01, -0.2, 0.3], [-2.3, 0.15, 0.1])
 """phantom_from_camera"""
@@ -44,7 +45,7 @@ class Noted:
 def phantom() -> Phantom:
     x, y = np.meshgrid(np.linspace(-X, X, 70), np.linspace(-Y, Y, 40))
     top = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, Z)])
-    return Phantom(POSE.inverse().apply(top), SIZE, {"corner": (X, Y, Z)}, None)
+    return Phantom(POSE.inverse().apply(top), Box(size=SIZE), {"corner": (X, Y, Z)}, None)
 
 
 @pytest.fixture

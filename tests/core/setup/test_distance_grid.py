@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from palpate.setup.box import Box
 from palpate.synthetic.bench.shape_families import draw_shape
@@ -28,3 +29,12 @@ def test_block_knows_its_distance_exactly() -> None:
     block = Box(size=(0.06, 0.04, 0.03))
     places = np.array([[0.0, 0.0, 0.04], [0.03, 0.02, 0.05], [0.0, 0.0, 0.02], [0.0, 0.0, -0.01]])
     assert np.allclose(block.outside(places), [0.01, 0.02, -0.01, 0.01])
+
+
+def test_closed_surfaces_are_closed_and_turn_outwards() -> None:
+    for body in (Box(size=(0.06, 0.04, 0.03)), draw_shape("liver", 0)):
+        vertices, triangles = body.closed_surface
+        a, b, c = vertices[triangles].transpose(1, 0, 2)
+        assert np.einsum("ti,ti->", a, np.cross(b, c)) / 6 == pytest.approx(body.volume)
+        ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        assert (np.unique(ends, axis=0, return_counts=True)[1] == 2).all()
