@@ -149,6 +149,11 @@ class BlockSurface(Surface):
             normals.append(np.tile(normal, (nx * ny, 1)))
         return np.concatenate(normals)
 
+    @cached_property
+    def patch_sides(self) -> IntArray:
+        """(p,) numbers of the patches' sides."""
+        return np.repeat(np.arange(len(SIDES)), np.diff(self._layout[1]))
+
     def edge_distance(self, points: FloatArray, side: IntArray) -> FloatArray:
         """Distance (m,) [m] of rest positions to the nearest edge of their side, the base
         included.

@@ -175,6 +175,11 @@ class Surface(ABC):
     def patch_normals(self) -> FloatArray:
         """(p, 3) outward normals of the patches at rest."""
 
+    @property
+    @abstractmethod
+    def patch_sides(self) -> IntArray:
+        """(p,) numbers of the patches' sides."""
+
     @abstractmethod
     def patch_of(self, points: FloatArray, side: IntArray) -> IntArray:
         """Patch numbers (m,) of rest positions (m, 3) [m] on sides (m,)."""

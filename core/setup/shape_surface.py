@@ -140,6 +140,11 @@ class ShapeSurface(Surface):
         """(p, 3) outward normals of the patches at rest."""
         return self._partition[1]
 
+    @property
+    def patch_sides(self) -> IntArray:
+        """(p,) numbers of the patches' sides."""
+        return self._partition[2]
+
     def patch_of(self, points: FloatArray, side: IntArray) -> IntArray:
         """Patch numbers (m,) of rest positions (m, 3) [m] on sides (m,)."""
         centres, _, sides = self._partition

@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.evidence import Block
 from palpate.diagnosis.inference.noise.camera_error_model import CameraErrors, camera_errors
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.patch_averages import patch_means
 from palpate.measurement.segmentation import Cleaner
@@ -26,6 +26,9 @@ from palpate.replay.replay import rest
 from palpate.setup.setup import Setup
 
 __all__ = ["RestCloud"]
+
+_FLAT = 1e-6
+"""Extent below which a coordinate does not change along a side [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ class RestCloud:
         directions = np.concatenate([normals, np.tile([0.0, 0.0, 1.0], (len(height), 1))])
         pivot = np.array([0.0, 0.0, setup.geometry.height])
         moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
-        free = np.column_stack([moved, _bulges(places[: len(used)], normals, len(residual))])
+        free = np.column_stack([moved, _bulges(centres, surface.patch_sides[used], len(residual))])
         depth = sight.pose.inverse().apply(places)[:, 2]
         errors = camera_errors(places, depth, white, residual, free)
         covariance = (
@@ -152,15 +155,17 @@ def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     return means[good] * np.array([1.0, 1.0, 0.0]), means[good, 2], spread**2 / count[good]
 
 
-def _bulges(centres: FloatArray, normals: FloatArray, rows: int) -> FloatArray:
-    """Return columns (rows, c) by which each side is shifted and bulges.
+def _bulges(centres: FloatArray, sides: IntArray, rows: int) -> FloatArray:
+    """Return columns (rows, c) by which each side is shifted and bulges, by second powers of the
+    coordinates that change along it.
 
     The smooth bias is not to explain that.
     """
     found = []
-    for side in np.unique(normals, axis=0):
-        here = (normals == side).all(axis=1).astype(float)
-        along = [axis for axis in range(3) if side[axis] == 0]
+    for side in np.unique(sides):
+        here = (sides == side).astype(float)
+        extent = np.ptp(centres[sides == side], axis=0)
+        along = [axis for axis in range(3) if extent[axis] > _FLAT]
         shapes = [here, *(here * centres[:, axis] ** power for axis in along for power in (1, 2))]
         found += [np.concatenate([shape, np.zeros(rows - len(centres))]) for shape in shapes]
     return np.column_stack(found) if found else np.zeros((rows, 0))
