@@ -154,11 +154,11 @@ def attempt(number: int, seed: int = 0) -> Trial:
             family, table, seen.share, np.inf, np.inf, False, (0, False), False, 0.0, str(error)
         )
     seconds = time.perf_counter() - began
-    error, turn, right = _off(fit, seen.pose, body)
+    apart, turn, right = _off(fit, seen.pose, body)
     any_right = right or any(_off(other, seen.pose, body)[2] for other in fit.alternatives)
     alike = (1 + len(fit.alternatives), any_right)
     weak = bool(fit.weak_directions)
-    return Trial(family, table, seen.share, error, turn, right, alike, weak, seconds)
+    return Trial(family, table, seen.share, apart, turn, right, alike, weak, seconds)
 
 
 def main(count: int, seed: int, workers: int) -> int:

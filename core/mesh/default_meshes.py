@@ -14,7 +14,7 @@ __all__ = ["Use", "default_mesh", "default_spec"]
 
 
 class Use(Enum):
-    """What a mesh is for, from the coarsest to the finest."""
+    """Uses of a mesh, from the coarsest mesh to the finest."""
 
     SCREEN = (SCREEN_GRID, SCREEN_PUSHES)
     PAGE = (PAGE_GRID, REPLAY_PUSHES)

@@ -15,7 +15,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.pose import motion_jacobian, small_motion
 from palpate.registration.shape.seen_body import SeenBody
-from palpate.registration.shape.view import View
+from palpate.registration.shape.seen_rays import SeenRays
 
 __all__ = ["Hypothesis", "find_poses", "improved"]
 
@@ -45,7 +45,7 @@ class Hypothesis:
 
     Attributes:
         pose: phantom_from_view.
-        misfit: mean squared error of depth (`View.misfit`) [variances].
+        misfit: mean squared error of depth (`SeenRays.misfit`) [variances].
     """
 
     pose: Transform
@@ -58,7 +58,7 @@ class Hypothesis:
         return away > _APART or float(np.linalg.norm(motion.rotation_vector)) > _TURNED
 
 
-def find_poses(view: View, body: SeenBody) -> list[Hypothesis]:
+def find_poses(view: SeenRays, body: SeenBody) -> list[Hypothesis]:
     """Return poses that may be right, best first, each different from those before it.
 
     Args:
@@ -85,7 +85,7 @@ def distinct(found: Iterable[Hypothesis], body: SeenBody) -> list[Hypothesis]:
     return kept
 
 
-def _hypothesis(view: View, body: SeenBody, pose: Transform) -> Hypothesis:
+def _hypothesis(view: SeenRays, body: SeenBody, pose: Transform) -> Hypothesis:
     return Hypothesis(pose, view.misfit(body, pose))
 
 
@@ -107,7 +107,7 @@ def _all_rotations() -> list[FloatArray]:
     return list(Rotation.from_quat(quaternions).as_matrix())
 
 
-def _starts(view: View, body: SeenBody, rotation: FloatArray) -> list[Hypothesis]:
+def _starts(view: SeenRays, body: SeenBody, rotation: FloatArray) -> list[Hypothesis]:
     """Put the middle of what may be the body on the middle of what a camera would see of it, and
     beside it, across the line of sight.
     """
@@ -131,7 +131,7 @@ def _starts(view: View, body: SeenBody, rotation: FloatArray) -> list[Hypothesis
     return [Hypothesis(pose, view.misfit(body, pose, _RAYS)) for pose in poses]
 
 
-def improved(view: View, body: SeenBody, pose: Transform) -> Transform:
+def improved(view: SeenRays, body: SeenBody, pose: Transform) -> Transform:
     """Improve a pose by point-to-plane ICP with Tukey's weights whose reach shrinks.
 
     With a table the body keeps standing on it.

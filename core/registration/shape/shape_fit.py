@@ -15,7 +15,7 @@ from palpate.registration.pose import small_motion
 from palpate.registration.shape.pose_search import Hypothesis, distinct, find_poses, improved
 from palpate.registration.shape.ray_fit import BODY, TABLE, refined, weighted
 from palpate.registration.shape.seen_body import SeenBody
-from palpate.registration.shape.view import View
+from palpate.registration.shape.seen_rays import SeenRays
 from palpate.registration.uncertainty import estimate, make_patches, weak_directions
 from palpate.setup.phantom_geometry import Geometry
 
@@ -74,7 +74,7 @@ def refine_shape_camera(
     """
     body = SeenBody(geometry)
     table = _table(cloud, body, depth_sigma)
-    view = View.of(cloud, body, depth_sigma, table)
+    view = SeenRays.of(cloud, body, depth_sigma, table)
     pose = improved(view, body, start @ view.to_camera) @ view.from_camera
     return _fitted(cloud, body, pose, depth_sigma, view)
 
@@ -93,14 +93,14 @@ def _table(cloud: FloatArray, body: SeenBody, depth_sigma: float) -> TablePlane 
 
 def _searched(
     cloud: FloatArray, body: SeenBody, depth_sigma: float, guess: Transform | None
-) -> tuple[View, list[Hypothesis]]:
+) -> tuple[SeenRays, list[Hypothesis]]:
     """Return the view, with the table or without it, that a pose explains better, and its poses."""
-    tried, failure = list[tuple[View, list[Hypothesis]]](), None
+    tried, failure = list[tuple[SeenRays, list[Hypothesis]]](), None
     for table in dict.fromkeys((_table(cloud, body, depth_sigma), None)):
         if tried and tried[0][1][0].misfit < _POOR:
             break
         try:
-            view = View.of(cloud, body, depth_sigma, table)
+            view = SeenRays.of(cloud, body, depth_sigma, table)
         except RegistrationError as error:
             failure = error
             continue
@@ -116,7 +116,7 @@ def _searched(
 
 
 def _all_fitted(
-    cloud: FloatArray, body: SeenBody, depth_sigma: float, view: View, found: list[Hypothesis]
+    cloud: FloatArray, body: SeenBody, depth_sigma: float, view: SeenRays, found: list[Hypothesis]
 ) -> list[tuple[CameraFit, float]]:
     """Return the refined poses that differ, with their log likelihoods [nats], best first."""
     fits = []
@@ -137,7 +137,7 @@ def _all_fitted(
 
 
 def _fitted(
-    cloud: FloatArray, body: SeenBody, pose: Transform, depth_sigma: float, view: View
+    cloud: FloatArray, body: SeenBody, pose: Transform, depth_sigma: float, view: SeenRays
 ) -> CameraFit:
     """Refine a pose along rays, with covariance and statistics."""
     gate, pivot, table = max(2.0 * depth_sigma, 3.0e-3), body.middle, view.table

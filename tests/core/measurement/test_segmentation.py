@@ -163,7 +163,7 @@ def test_measured_datasets_keep_the_block_and_little_else(measured_datasets):
         outside = total = 0
         for index in range(0, len(sequence), 8):
             found = cleaner.clean(sequence.cloud(index), tools[index])
-            outside += int((box_distance(found.points, np.array(dataset.config.size)) > 3e-3).sum())
+            outside += int((box_distance(found.points, dataset.config.size) > 3e-3).sum())
             total += len(found.points)
             assert found.counts["kept"] > 1800
         assert outside < 1e-3 * total

@@ -17,9 +17,7 @@ def test_the_shaft_in_the_picture_corrects_a_stated_place_across_it(scene):
     points = view.pose.apply(view.cloud)
     points = points[points[:, 2] > 0.004]
     stated = ToolPose(centre + np.array([0.0015, -0.002, 0.0]), ToolShaft(UP, 4e-3))
-    found = locate_tool(
-        points, box_distance(points, np.array(SIZE)), stated, view.pose.translation, 2e-3
-    )
+    found = locate_tool(points, box_distance(points, SIZE), stated, view.pose.translation, 2e-3)
     assert np.linalg.norm(found.centre - centre) < 0.5 * np.linalg.norm(stated.centre - centre)
 
 

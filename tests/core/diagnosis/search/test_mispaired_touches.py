@@ -53,7 +53,7 @@ def _touched() -> tuple[Setup, Registration]:
         phantom_from_robot=found.phantom_from_robot,
         touching=Touching(misses=misses, lift=LIFT[2]),
     )
-    (repair,) = find_repairs(touches, expected, SIZE, STARTS)
+    (repair,) = find_repairs(touches, expected, BLOCK, STARTS)
     return setup, replace(
         stated_registration(), phantom_from_robot=found.phantom_from_robot, repair=repair
     )

@@ -15,7 +15,7 @@ from palpate.registration.camera.table_plane import TablePlane
 from palpate.registration.faces import CELL
 from palpate.registration.shape.seen_body import SeenBody
 
-__all__ = ["View"]
+__all__ = ["SeenRays"]
 
 _FEWEST = 50
 """Least number of points that may be the body's."""
@@ -32,7 +32,7 @@ _SMOOTH = 0.5e-3
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SeenRays:
     """A rest cloud in a frame in which the camera's centre is known.
 
     With a table the frame has the table in z = 0; without, it is the camera's.
