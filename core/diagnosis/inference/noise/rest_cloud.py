@@ -27,9 +27,6 @@ from palpate.setup.setup import Setup
 
 __all__ = ["RestCloud"]
 
-_FLAT = 1e-6
-"""Extent below which a coordinate does not change along a side [m]."""
-
 
 @dataclass(frozen=True, eq=False)
 class RestCloud:
@@ -165,7 +162,7 @@ def _bulges(centres: FloatArray, sides: IntArray, rows: int) -> FloatArray:
     for side in np.unique(sides):
         here = (sides == side).astype(float)
         extent = np.ptp(centres[sides == side], axis=0)
-        along = [axis for axis in range(3) if extent[axis] > _FLAT]
+        along = [axis for axis in range(3) if extent[axis] > 1e-6 * extent.max()]
         shapes = [here, *(here * centres[:, axis] ** power for axis in along for power in (1, 2))]
         found += [np.concatenate([shape, np.zeros(rows - len(centres))]) for shape in shapes]
     return np.column_stack(found) if found else np.zeros((rows, 0))
