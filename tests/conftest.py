@@ -45,7 +45,7 @@ SECOND_TIER = (
     "tests/core/measurement/test_phantom_drift.py::test_a_block_that_slid",
     "tests/core/measurement/test_phantom_drift.py::test_only_the_slid",
     "tests/core/recording/test_resolve_frame.py",
-    "tests/core/registration/camera/test_camera_fit.py::test_camera_covariance",
+    "tests/core/registration/camera/test_block_fit.py::test_camera_covariance",
     "tests/core/registration/test_registration.py::test_both_poses",
     "tests/core/registration/test_registration.py::test_wrong_pairings",
     "tests/core/replay/test_friction_step.py::test_failed_frame",

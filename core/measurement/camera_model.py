@@ -5,7 +5,7 @@ the camera misreads depth, or the block has another size, the same registration 
 pose from another true pose. The error is computed here without the cloud: the visible planes of the
 true block, read with the camera's error, are registered to the stated planes, and the motion found
 is inverted. Table and sides determine the pose, and the top may be offset as a whole, as in
-`palpate.registration.camera.camera_fit`, where the table has most points. Along an axis without a
+`palpate.registration.camera.block_fit`, where the table has most points. Along an axis without a
 visible side the pose stays as stated.
 """
 

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.camera.camera_fit import CameraFit, fit_camera, refine_camera
+from palpate.registration.camera.block_fit import fit_camera, refine_camera
+from palpate.registration.camera.camera_fit import CameraFit
 from palpate.registration.camera.heading import turned_fit
 from palpate.registration.shape.shape_fit import fit_shape_camera, refine_shape_camera
 from palpate.setup.phantom_geometry import Geometry

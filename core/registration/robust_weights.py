@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["depth_noise", "robust_weights"]
+__all__ = ["centred_weights", "depth_noise", "robust_weights"]
 
 HUBER, TUKEY = 1.345, 4.685
 """Tuning constants of the robust weights, in standard deviations; 95 % efficiency."""
@@ -37,3 +37,18 @@ def robust_weights(
     if tukey:
         return np.asarray(np.maximum(0.0, 1 - (scaled / TUKEY) ** 2) ** 2)
     return np.asarray(np.minimum(1.0, HUBER / np.maximum(scaled, 1e-12)))
+
+
+def centred_weights(part: IntArray, distance: FloatArray, slant: FloatArray) -> FloatArray:
+    """Tukey's weights (k,) [1] of distances about the median of their part, so that a part with an
+    offset is no outlier.
+
+    Args:
+        part: number of each point's part (k,).
+        distance: as for `depth_noise`.
+        slant: as for `depth_noise`.
+    """
+    centred = distance.copy()
+    for number in np.unique(part):
+        centred[part == number] -= np.median(distance[part == number])
+    return robust_weights(centred, slant, depth_noise(centred, slant), tukey=True)

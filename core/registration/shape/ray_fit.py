@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,14 +20,15 @@ from palpate.registration.faces import (
     joined,
 )
 from palpate.registration.pose import motion_jacobian, small_motion
-from palpate.registration.robust_weights import depth_noise, robust_weights
+from palpate.registration.robust_weights import centred_weights, depth_noise, robust_weights
 from palpate.registration.shape.seen_body import SeenBody
 from palpate.registration.uncertainty import PRIOR
 
-__all__ = ["BODY", "TABLE", "on_surface", "refined", "weighted"]
+__all__ = ["BODY", "PARTS", "TABLE", "on_surface", "refined", "weighted"]
 
+PARTS = ("surface", "table")
 BODY, TABLE = 0, 1
-"""Parts of the surface, as `Assignment.face` numbers them."""
+"""Parts of the surface, and as `Assignment.face` numbers them."""
 _LEAST_SAG = 0.05
 """Sag of the body's lowest parts, so that they count as the body's [1]."""
 _LEAST_POINTS = 50
@@ -195,16 +196,6 @@ def refined(
 def weighted(
     cloud: FloatArray, body: SeenBody, pose: Transform, gate: float, *, table: bool
 ) -> tuple[Assignment, FloatArray]:
-    """Points on the surface, and robust weights (k,) about the median of each part, so that a part
-    with an offset is no outlier. Arguments as for `on_surface`.
-    """
+    """Points on the surface, and their robust weights (k,); arguments as for `on_surface`."""
     found = on_surface(cloud, body, pose, gate, table=table)
-    medians = np.array(
-        [
-            np.median(found.distance[found.face == part]) if (found.face == part).any() else 0.0
-            for part in (BODY, TABLE)
-        ]
-    )
-    centred = replace(found, distance=found.distance - medians[found.face])
-    noise = depth_noise(centred.distance, centred.slant)
-    return found, robust_weights(centred.distance, centred.slant, noise, tukey=True)
+    return found, centred_weights(found.face, found.distance, found.slant)

@@ -13,10 +13,10 @@ from palpate.registration.camera.camera_fit import EXPLAINED_LEAST, LEAST_POINTS
 from palpate.registration.camera.table_plane import TablePlane, find_table
 from palpate.registration.pose import small_motion
 from palpate.registration.shape.pose_search import Hypothesis, distinct, find_poses, improved
-from palpate.registration.shape.ray_fit import BODY, TABLE, refined, weighted
+from palpate.registration.shape.ray_fit import PARTS, refined, weighted
 from palpate.registration.shape.seen_body import SeenBody
 from palpate.registration.shape.seen_rays import SeenRays
-from palpate.registration.uncertainty import estimate, make_patches, weak_directions
+from palpate.registration.uncertainty import estimate, make_patches
 from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["fit_shape_camera", "refine_shape_camera"]
@@ -29,7 +29,6 @@ _LARGER = 1.1
 """Least extent of a table over the body's [1]."""
 _ALIKE = 6.0
 """Difference of log likelihood below which two poses fit alike [nats]."""
-_NAMES = ("surface", "table")
 
 
 def fit_shape_camera(
@@ -149,30 +148,9 @@ def _fitted(
         # Along weak directions the outline knows more than the points on the surface do.
         pose = small_motion(last.settled(body.reach), pivot) @ pose
     found, weights = weighted(cloud, body, pose, gate, table=table)
-    seen = [k for k in (BODY, TABLE) if (weights[found.face == k] > 0).any()]
-    counts = {_NAMES[k]: int((weights[found.face == k] > 0).sum()) for k in seen}
-    offsets = {
-        _NAMES[k]: float(
-            np.average(found.distance[found.face == k], weights=weights[found.face == k])
-        )
-        for k in seen
-    }
-    return CameraFit(
-        phantom_from_camera=pose,
-        covariance=last.covariance,
-        pivot=pivot,
-        lever=body.reach,
-        rms=float(np.sqrt(np.average(found.distance**2, weights=weights))),
-        noise=patches.noise,
-        bias=last.bias,
-        face_counts=counts,
-        face_offsets=offsets,
-        table_height=offsets.get("table", float("nan")),
-        weak_directions=weak_directions(last.covariance, counts, body.reach),
-        explained=view.explained(body, pose @ view.to_camera),
-        automatic=True,
-        warnings=(),
-    )
+    fit = CameraFit.of(pose, last, found, weights, PARTS, pivot=pivot, lever=body.reach)
+    explained = view.explained(body, pose @ view.to_camera)
+    return replace(fit, noise=patches.noise, explained=explained)
 
 
 def _away(pose: Transform, other: Transform, body: SeenBody) -> float:

@@ -14,7 +14,7 @@ from palpate.effects.sensor import CameraRegistration, DepthBias
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import CameraModel, camera_model_for
-from palpate.registration.camera.camera_fit import fit_camera
+from palpate.registration.camera.block_fit import fit_camera
 from palpate.setup.setup import Setup
 
 SMALLER = GeometryScale(scale_x=1.04, scale_y=0.97, scale_z=1.03)

@@ -5,7 +5,8 @@ import pytest
 
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
-from palpate.registration.camera.camera_fit import CameraFit, fit_camera
+from palpate.registration.camera.block_fit import fit_camera
+from palpate.registration.camera.camera_fit import CameraFit
 from palpate.registration.pose import small_motion
 
 SIZE = (0.0687, 0.0393, 0.0358)
