@@ -32,10 +32,7 @@ def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None
     if verdict == "replay":
         return f"Replayed with {_listed(phrases, 'and')}." if phrases else "Replayed as stated."
     if verdict == "none":
-        return (
-            "The simulation misses nothing that this data could show: what is left is noise and "
-            "the stated accuracies."
-        )
+        return _nothing_named(report)
     if verdict == "unexplained":
         return "Structured error remains that no known effect removes."
     if verdict == "ambiguous" and (family := report.get("family")):
@@ -48,6 +45,24 @@ def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None
     if verdict == "ambiguous":
         return f"Several causes explain the data equally well: {_listed(phrases, 'or')}."
     return f"The simulation misses {_listed(phrases, 'and')}{_gain(report)}."
+
+
+def _nothing_named(report: dict[str, Any]) -> str:
+    """The verdict `none`, with the hints of the ranking if there are any."""
+    hints = [words(row["effect"]) for row in report.get("ranking", []) if row.get("hint")]
+    small = report.get("small_remainder")
+    if hints:
+        why = "" if small is None else f": what it may explain is {_within(small)}"
+        return (
+            f"No cause is sure enough to be named; {_listed(hints, 'and')} "
+            f"{'is a hint' if len(hints) == 1 else 'are hints'}{why}."
+        )
+    if small is not None:
+        return f"The simulation misses nothing that matters: what is left is {_within(small)}."
+    return (
+        "The simulation misses nothing that this data could show: what is left is noise and "
+        "the stated accuracies."
+    )
 
 
 def limit_phrase(row: dict[str, Any]) -> str:
@@ -181,8 +196,11 @@ def _clues(clues: dict[str, Any]) -> list[str]:
 
 def _small(left: dict[str, Any]) -> str:
     """Structured error within the tolerance."""
-    within = quantity(1e-3 * left["tolerance_mm"], "m")
-    return f"A structured error is left{_size(left)}, within the tolerance of {within}."
+    return f"A structured error is left{_size(left)}, {_within(left)}."
+
+
+def _within(left: dict[str, Any]) -> str:
+    return f"within the tolerance of {quantity(1e-3 * left['tolerance_mm'], 'm')}"
 
 
 def _size(left: dict[str, Any], before: str = ", ") -> str:

@@ -47,6 +47,26 @@ def test_other_verdicts_say_so(report: dict[str, Any], verdict: str, words: str)
     assert words in verdict_sentence({**report, "verdict": verdict})
 
 
+def test_a_hint_is_in_the_verdict_and_nothing_is_said_to_be_missed_by_none() -> None:
+    rows: list[dict[str, Any]] = [
+        {"effect": "stiff_inclusion", "hint": "would explain the data by 39 nats"},
+        {"effect": "gravity"},
+    ]
+    small = {"rms_mm": 0.054, "share_of_motion": 0.13, "tolerance_mm": 0.1}
+    none: dict[str, Any] = {"verdict": "none", "ranking": rows}
+    assert plain(verdict_sentence(none)) == (
+        "No cause is sure enough to be named; stiff inclusion is a hint."
+    )
+    assert plain(verdict_sentence({**none, "small_remainder": small})) == (
+        "No cause is sure enough to be named; stiff inclusion is a hint: "
+        "what it may explain is within the tolerance of 0.10 mm."
+    )
+    rows[1]["hint"] = "would explain the data by 30 nats"
+    assert "stiff inclusion and gravity are hints" in plain(verdict_sentence(none))
+    told = verdict_sentence({"verdict": "none", "ranking": [], "small_remainder": small})
+    assert "nothing that matters" in told and "tolerance" in told
+
+
 def test_what_is_left_is_told_with_place_and_time(report: dict[str, Any]) -> None:
     left = {
         "fraction": 0.55,

@@ -86,11 +86,15 @@ def test_fork_server_killed_while_a_job_starts_loses_no_job(
 
 
 def test_second_server_on_the_same_datasets_leaves_an_import_alone(
-    server: tuple[subprocess.Popen[str], httpx.Client], place: Path, tmp_path: Path, sent: bytes
+    server: tuple[subprocess.Popen[str], httpx.Client], place: Path, tmp_path: Path
 ) -> None:
     process, client = server
+    block = write_valid_dataset(tmp_path / "large" / "block")
+    cloud = np.tile(small_cloud(), (2 * 10**6 // len(small_cloud()), 1))
+    (block / "rest.ply").write_bytes(ply_bytes(cloud))  # unpacked and checked for long enough
+    archive = shutil.make_archive(str(tmp_path / "large"), "zip", tmp_path / "large", "block")
     before = set(family(process.pid))
-    job = import_of(client, "shared", sent)
+    job = import_of(client, "shared", Path(archive).read_bytes())
     end = time.monotonic() + 60
     # Once there is a file, the worker has let go of the lock of the parent folder.
     while not list((place / "datasets").glob(".*/*/*")) and time.monotonic() < end:
