@@ -10,7 +10,7 @@ import trimesh
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.mesh.gmsh_fill import TetSpec, fill
 from palpate.mesh.tet_mesh import TetMesh
-from palpate.setup.fixed_region import FixedRegion, Plane
+from palpate.setup.free_form.fixed_region import FixedRegion, Plane
 from palpate.setup.setup import Shape
 from palpate.synthetic.bench.organ_shape import write_surface
 

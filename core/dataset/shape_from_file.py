@@ -9,9 +9,9 @@ import numpy as np
 from palpate.dataset.files import open_inside, problem
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
-from palpate.setup.fixed_region import Plane
+from palpate.setup.free_form.fixed_region import Plane
+from palpate.setup.free_form.surface_file import FORMATS, read_surface
 from palpate.setup.setup import Shape
-from palpate.setup.surface_file import FORMATS, read_surface
 
 __all__ = ["read_shape"]
 

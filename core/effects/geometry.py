@@ -1,4 +1,4 @@
-"""Causes in the block's shape and in its mesh."""
+"""Causes in the phantom's shape and in its mesh."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
+import numpy as np
+
 from palpate.effects.base import Effect, Slot
 from palpate.effects.linearisation import Linearisation, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
-from palpate.setup.setup import Box, Setup
+from palpate.setup.setup import Setup
 
 __all__ = ["DIAGNOSIS_GRID", "GeometryScale", "MeshResolution"]
 
@@ -36,7 +38,7 @@ class GeometryScale(Effect):
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
-        x, y, z = (float(factor) for factor in setup.scale)
+        x, y, z = setup.factors
         return cls(scale_x=x, scale_y=y, scale_z=z)
 
     @classmethod
@@ -47,9 +49,8 @@ class GeometryScale(Effect):
     def apply(self, setup: Setup) -> Setup:
         if (self.scale_x, self.scale_y, self.scale_z) == (1.0, 1.0, 1.0):
             return replace(setup, geometry=setup.stated_geometry, registered=None)
-        stated = setup.stated_box
-        x, y, z = stated.size
-        true = Box(size=(self.scale_x * x, self.scale_y * y, self.scale_z * z))
+        stated = setup.stated_geometry
+        true = stated.scaled(np.array([self.scale_x, self.scale_y, self.scale_z]))
         return replace(setup, geometry=true, registered=stated)
 
     @classmethod

@@ -24,7 +24,7 @@ from palpate.effects.base import with_effects
 from palpate.experiment.observed_clouds import ObservedClouds, segment_clouds
 from palpate.experiment.replayed_sequence import ReplayedSequence
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.foundation.errors import DatasetError, RegistrationError
+from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import Cleaner, cleaner_for
@@ -85,7 +85,6 @@ class Experiment:
     @classmethod
     def registered(cls, dataset: Dataset, registration: Registration) -> Self:
         """The experiment of a dataset whose registration is known already."""
-        _refuse_clouds(dataset)
         aligned, registration = align_sequences(dataset, registration)
         return cls(aligned, registration, setup_from(aligned, registration))
 
@@ -199,16 +198,6 @@ class Experiment:
         frames = replay(self.setup, centres, mesh, times=clock, tolerance=tolerance, report=report)
         return ReplayedSequence(
             self, sequence, times, index if observed else None, centres, tuple(frames)
-        )
-
-
-def _refuse_clouds(dataset: Dataset) -> None:
-    """Raise RegistrationError for clouds of a phantom that is no block."""
-    if dataset.has_rest and dataset.observed and not dataset.geometry.is_block:
-        raise RegistrationError(
-            f"{dataset.config.surface}: clouds of other phantoms than a block can be registered, "
-            "but not compared yet; leave the clouds of this dataset out, so that its forces are "
-            "compared"
         )
 
 

@@ -22,7 +22,7 @@ from palpate.fem.topology import topology
 from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.mesh.elements import face_weights
 from palpate.mesh.protocol import Mesh
-from palpate.setup.closest_point import winding_number
+from palpate.setup.free_form.closest_point import winding_number
 from palpate.setup.setup import Setup
 
 __all__ = ["CONTACT_STIFFNESS", "Assembly", "BlockModel", "ToolSphere"]
@@ -50,7 +50,7 @@ class ToolSphere:
 class AddedPotential(Protocol):
     """A quadratic potential of the unknowns' displacements, constant over one time step.
 
-    `palpate.fem.history_stress` makes one.
+    `palpate.fem.history.history_stress` makes one.
     """
 
     @property

@@ -9,7 +9,6 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
-from palpate.mesh.box_mesh import BoxMesh
 from palpate.mesh.protocol import Mesh
 from palpate.replay.material_history import require_memoryless
 from palpate.replay.replay import Equilibrium, Replay
@@ -72,8 +71,8 @@ def same_body(block: Replay, setup: Setup) -> bool:
 
 
 def mesh_in(block: Replay, setup: Setup, frame: Equilibrium) -> Mesh:
-    """The frame's mesh, scaled to the setup's block if that has another size."""
-    if setup.geometry == block.setup.geometry or not isinstance(frame.mesh, BoxMesh):
+    """The frame's mesh, scaled to the setup's body if that has another size."""
+    if setup.geometry == block.setup.geometry:
         return frame.mesh
     return frame.mesh.scaled(np.array(setup.geometry.size) / np.array(block.setup.geometry.size))
 

@@ -1,10 +1,11 @@
 """Camera model: readings to points in the phantom frame, with pose and depth errors of a setup.
 
-The stated pose comes from the registration of the rest cloud to the stated block on its table. If
-the camera misreads depth, or the block has another size, the same registration gives the stated
-pose from another true pose. The error is computed here without the cloud: the visible planes of the
-true block, read with the camera's error, are registered to the stated planes, and the motion found
-is inverted. Table and sides determine the pose, and the top may be offset as a whole, as in
+The stated pose comes from the registration of the rest cloud to the stated body on its table. If
+the camera misreads depth, or the body has another size, the same registration gives the stated
+pose from another true pose. The error is computed here without the cloud. A free form's is that of
+`palpate.registration.shape.shape_response`. For a block, the visible planes of the true block, read
+with the camera's error, are registered to the stated planes, and the motion found is inverted.
+Table and sides determine the pose, and the top may be offset as a whole, as in
 `palpate.registration.camera.block_fit`, where the table has most points. Along an axis without a
 visible side the pose stays as stated.
 """
@@ -20,6 +21,7 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.registration.faces import NORMALS, camera_planes
 from palpate.registration.pose import motion_jacobian, small_motion
+from palpate.registration.shape.shape_response import registration_error
 from palpate.setup.setup import Setup
 
 __all__ = ["CameraModel", "camera_model_for"]
@@ -85,7 +87,11 @@ def _registration_error(setup: Setup) -> Transform:
     sensor = setup.sensor
     if setup.registered is None and sensor.depth_offset == 0.0 and sensor.depth_scale == 1.0:
         return Transform()
-    stated, true_size = setup.stated_box.size, np.array(setup.geometry.size)
+    if not setup.stated_geometry.is_block:
+        return registration_error(
+            setup.stated_geometry, setup.phantom_from_camera, sensor, setup.scale
+        )
+    stated, true_size = setup.stated_geometry.size, np.array(setup.geometry.size)
     places, face, column = _seen(
         stated, tuple(float(part) for part in setup.phantom_from_camera.translation)
     )

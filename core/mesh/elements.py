@@ -39,6 +39,7 @@ __all__ = [
     "Face",
     "Quadrature",
     "face_weights",
+    "quadratic_gradients",
     "quadrature",
     "shapes_of",
 ]
@@ -188,7 +189,7 @@ def shapes_of(shares: FloatArray) -> FloatArray:
     )
 
 
-def _quadratic_gradients(shares: FloatArray) -> FloatArray:
+def quadratic_gradients(shares: FloatArray) -> FloatArray:
     """Gradients (p, a, d) of the same by the barycentric coordinates after the first.
 
     These coordinates span the reference element.
@@ -224,7 +225,7 @@ def _triangle(parts: int = 1) -> Face:
     )
     shares = np.concatenate([shares @ corners for corners in _split(parts)])
     return Face(
-        shapes_of(shares), _quadratic_gradients(shares), np.tile(weights, parts**2) / (2 * parts**2)
+        shapes_of(shares), quadratic_gradients(shares), np.tile(weights, parts**2) / (2 * parts**2)
     )
 
 
@@ -250,7 +251,7 @@ def _tetrahedron(face: Face, dense_face: Face) -> Element:
     shares = np.full((4, 4), (1 - far) / 3) + (far - (1 - far) / 3) * np.eye(4)
     return Element(
         shapes_of(shares),
-        _quadratic_gradients(shares),
+        quadratic_gradients(shares),
         np.full(4, 1 / 24),
         np.ones((4, 1)),
         face,

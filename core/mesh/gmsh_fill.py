@@ -21,9 +21,9 @@ from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError, SetupError
 from palpate.foundation.signal_handling import signals_kept
 from palpate.mesh.protocol import FINER
-from palpate.mesh.tet_mesh import TetMesh, sides_of
-from palpate.setup.closest_point import nearest
-from palpate.setup.shape import Shape
+from palpate.mesh.tet_mesh import TetMesh, sides_of, stretched
+from palpate.setup.free_form.closest_point import nearest
+from palpate.setup.free_form.shape import Shape
 
 if TYPE_CHECKING:
     from palpate.setup.setup import Setup
@@ -94,7 +94,8 @@ class TetSpec:
 
     def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
         """The mesh, the same for all positions of the tool's centre."""
-        return fill(setup.shape, self)
+        made = fill(setup.stated_shape, self)
+        return made if setup.registered is None else stretched(made, setup.factors)
 
     def finer(self) -> TetSpec:
         """The same with nodes FINER times closer."""

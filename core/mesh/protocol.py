@@ -76,6 +76,11 @@ class Mesh(Protocol):
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
         """Interpolate a nodal field (n, c) at rest positions (m, 3) [m], as `locate` does."""
 
+    def scaled(self, factors: FloatArray) -> Mesh:
+        """The same elements in a body whose coordinates are multiplied by these factors (3,)
+        [1].
+        """
+
 
 class Meshing(Protocol):
     """A mesh specification of a body."""

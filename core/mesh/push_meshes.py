@@ -16,9 +16,9 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
 from palpate.mesh.gmsh_fill import TetSpec, check_spacing, fill
 from palpate.mesh.protocol import FINER
-from palpate.mesh.tet_mesh import TetMesh
-from palpate.setup.closest_point import nearest
-from palpate.setup.shape import Shape
+from palpate.mesh.tet_mesh import TetMesh, stretched
+from palpate.setup.free_form.closest_point import nearest
+from palpate.setup.free_form.shape import Shape
 
 if TYPE_CHECKING:
     from palpate.setup.setup import Setup
@@ -67,13 +67,14 @@ class PushMeshSpec:
 
     def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
         """The mesh of the push nearest to a tool's centre (3,) [m]."""
+        shape = setup.stated_shape
         if not self.places:
             raise MeshError(
-                f"{setup.shape.name}: no place that is pushed was named; name one at least",
-                places=0,
+                f"{shape.name}: no place that is pushed was named; name one at least", places=0
             )
         number = int(np.linalg.norm(np.array(self.places) - centre, axis=1).argmin())
-        return _filled(setup.shape, self.places[number], replace(self, places=()))
+        made = _filled(shape, self.places[number], replace(self, places=()))
+        return made if setup.registered is None else stretched(made, setup.factors)
 
     def finer(self) -> Self:
         """The same with nodes FINER times closer."""

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
-from palpate.mesh.elements import EDGES, TET10, shapes_of
+from palpate.mesh.elements import EDGES, TET10, quadratic_gradients, shapes_of
 from palpate.mesh.interpolation import weighted_nodes
 from palpate.mesh.protocol import Connectivity
-from palpate.setup.closest_point import containing, nearest
+from palpate.setup.free_form.closest_point import containing, nearest
 
-__all__ = ["TetMesh", "sides_of"]
+__all__ = ["TetMesh", "sides_of", "stretched"]
 
 _SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 """Corners of a tetrahedron's sides, counter-clockwise from outside."""
@@ -23,6 +23,12 @@ _QUARTERS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 _ON_THE_EDGE = 1e-9
 """A point of the surface may lie so far outside a tetrahedron by rounding, in barycentric
 coordinates [1]."""
+
+
+@lru_cache(maxsize=256)
+def stretched(mesh: TetMesh, factors: tuple[float, float, float]) -> TetMesh:
+    """Scale a mesh of a stated body; the same object for the same factors [1]."""
+    return mesh.scaled(np.array(factors))
 
 
 def sides_of(tetrahedra: IntArray) -> IntArray:
@@ -54,6 +60,15 @@ class TetMesh:
     def __getstate__(self) -> dict[str, Any]:
         """Pickle only the defining fields; everything else is computed again on demand."""
         return {"corners": self.corners, "tetrahedra": self.tetrahedra, "held": self.held}
+
+    def scaled(self, factors: FloatArray) -> TetMesh:
+        """The same tetrahedra in a body whose coordinates are multiplied by these factors (3,)
+        [1].
+        """
+        made = TetMesh(self.corners * factors, self.tetrahedra, self.held)
+        # Cached properties that do not depend on coordinates.
+        vars(made).update(_edges=self._edges, connectivity=self.connectivity)
+        return made
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
@@ -118,6 +133,19 @@ class TetMesh:
 
         Points outside are moved to the surface.
         """
+        element, shares = self._shares_of(points)
+        return self.connectivity.elements[element], shapes_of(shares)
+
+    def slopes(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Find elements' nodes (m, 10) and the gradients of their shape functions (m, 10, 3) [1/m]
+        at rest positions (m, 3) [m]; points outside are moved to the surface.
+        """
+        element, shares = self._shares_of(points)
+        gradients = quadratic_gradients(shares) @ self._frames[3][element]
+        return self.connectivity.elements[element], gradients
+
+    def _shares_of(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Tetrahedra (m,) and barycentric coordinates (m, 4) of points (m, 3) [m]."""
         places = np.array(points, dtype=float)
         element = containing(places, *self._frames, _ON_THE_EDGE)
         outside = np.flatnonzero(element < 0)
@@ -131,7 +159,7 @@ class TetMesh:
             np.concatenate([1 - shares.sum(axis=1, keepdims=True), shares], axis=1), 0.0, None
         )
         shares /= shares.sum(axis=1, keepdims=True)
-        return self.connectivity.elements[element], shapes_of(shares)
+        return element, shares
 
     @cached_property
     def _owners(self) -> IntArray:

@@ -136,7 +136,11 @@ def setup_from(dataset: Dataset, registration: Registration) -> Setup:
         geometry=dataset.geometry,
         tool=Tool(radius=config.tool_radius),
         material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
-        sensor=Sensor(depth_sigma=config.depth_sigma, edge=config.edge),
+        sensor=Sensor(
+            depth_sigma=config.depth_sigma,
+            edge=config.edge,
+            view=() if registration.camera is None else registration.camera.view,
+        ),
         mass=config.mass,
         landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
         touching=Touching(

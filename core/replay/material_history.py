@@ -11,9 +11,9 @@ so E is the modulus of a motion faster than any tau. Over a step of length t in 
 evenly the solution is exact, h_i <- e^(-t/tau_i) h_i + g_i r_i (change of S - T) with r_i = (1 -
 e^(-t/tau_i)) tau_i / t (Taylor, Pister and Goudreau 1970), however long the step; any other change
 of the strain between two frames is lost. In a step the new stress is a multiple of S and a part
-fixed by the past (`palpate.fem.history_stress`), which keeps its direction in the body while the
-strain goes on. That causes a pressure of second order in the strain's change, which a stiff bulk
-modulus hides.
+fixed by the past (`palpate.fem.history.history_stress`), which keeps its direction in the body
+while the strain goes on. That causes a pressure of second order in the strain's change, which a
+stiff bulk modulus hides.
 
 Permanent set: with L the logarithmic strain without the volumetric part, a point stores a strain M
 that grows along L by the excess of |L| over its largest earlier value (backward Euler from frame to
@@ -33,8 +33,8 @@ import numpy as np
 
 from palpate.fem.constitutive.elastic import Law
 from palpate.fem.continuation import move_tool
-from palpate.fem.history_stress import ConstantStress, shear_stress
-from palpate.fem.material_points import MaterialPoints, material_points
+from palpate.fem.history.history_stress import ConstantStress, shear_stress
+from palpate.fem.history.material_points import MaterialPoints, material_points
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.modified_newton import ModifiedNewton
 from palpate.fem.newton import Outcome, Solution, relative_residual, solve

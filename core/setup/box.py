@@ -48,6 +48,13 @@ class Box(Geometry):
         """Volume [m^3]."""
         return float(np.prod(self.size))
 
+    def scaled(self, factors: FloatArray) -> Box:
+        """The block whose edges are multiplied by these factors (3,) [1]."""
+        x, y, z = (
+            float(length * factor) for length, factor in zip(self.size, factors, strict=True)
+        )
+        return Box(size=(x, y, z))
+
     def nearest(self, points: FloatArray) -> FloatArray:
         """Points of the block (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where
         they are.

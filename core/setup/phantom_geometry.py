@@ -5,7 +5,7 @@ any shape.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -56,6 +56,10 @@ class Geometry(ABC):
     @abstractmethod
     def volume(self) -> float:
         """Enclosed volume [m^3]."""
+
+    @abstractmethod
+    def scaled(self, factors: FloatArray) -> Self:
+        """The body whose coordinates are multiplied by these factors (3,) [1]."""
 
     @abstractmethod
     def nearest(self, points: FloatArray) -> FloatArray:

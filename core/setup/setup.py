@@ -15,10 +15,10 @@ from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
 from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
+from palpate.setup.free_form.shape import Shape
 from palpate.setup.landmark_touches import PAIRINGS, Touching
 from palpate.setup.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
 from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Surface
-from palpate.setup.shape import Shape
 
 __all__ = [
     "PAIRINGS",
@@ -127,6 +127,8 @@ class Sensor:
         depth_scale: a in the same [1].
         edge: width of the band along the phantom's edges in which filters round depth [m]; points
             there are not compared.
+        view: (x/z, y/z) of the corners of the convex part of the image that the camera sees, camera
+            frame; empty for all of it.
     """
 
     depth_sigma: float = 0.002
@@ -135,6 +137,7 @@ class Sensor:
     depth_offset: float = 0.0
     depth_scale: float = 1.0
     edge: float = 0.0
+    view: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         require_within("sensor depth_offset", self.depth_offset, -0.2, 0.2, "m")
@@ -153,7 +156,7 @@ class Setup:
         support: of the base.
         sensor: the depth camera.
         mass: of the phantom [kg].
-        registered: the block that the registrations assumed; None if that is `geometry`.
+        registered: the body that the registrations assumed; None if that is `geometry`.
         landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot, on the
             registered block; they sag with it.
         touching: how the landmarks were touched.
@@ -170,7 +173,7 @@ class Setup:
     support: Support = field(default_factory=Support)
     sensor: Sensor = field(default_factory=Sensor)
     mass: float = 0.1
-    registered: Box | None = None
+    registered: Box | Shape | None = None
     landmarks: tuple[tuple[float, float, float], ...] = ()
     touching: Touching = field(default_factory=Touching)
     phantom_from_robot: Transform = field(default_factory=Transform)
@@ -221,28 +224,29 @@ class Setup:
         return self.registered or self.geometry
 
     @property
-    def stated_box(self) -> Box:
-        """The block that the registrations assumed; SetupError for other shapes."""
-        return self.registered or self.box
-
-    @property
     def scale(self) -> FloatArray:
-        """True over stated lengths of the block along x, y, z (3,) [1]."""
+        """True over stated lengths of the body along x, y, z (3,) [1]."""
         return (
             np.ones(3)
             if self.registered is None
-            else np.array(self.box.size) / np.array(self.registered.size)
+            else np.array(self.geometry.size) / np.array(self.registered.size)
         )
 
     @property
-    def shape(self) -> Shape:
-        """The geometry of a body that is not a block; SetupError for a block."""
-        if isinstance(self.geometry, Box):
+    def factors(self) -> tuple[float, float, float]:
+        """`scale` as a tuple, for keys of caches."""
+        x, y, z = (float(factor) for factor in self.scale)
+        return x, y, z
+
+    @property
+    def stated_shape(self) -> Shape:
+        """The stated geometry of a body that is not a block; SetupError for a block."""
+        if isinstance(self.stated_geometry, Box):
             raise SetupError(
                 "tetrahedra fill closed surfaces; mesh a block with a grid of hexahedra",
                 key="geometry",
             )
-        return self.geometry
+        return self.stated_geometry
 
     def surface(self, spacing: float = SPACING, patch: float = PATCH) -> Surface:
         """The free surface of the body, see `Geometry.surface`."""
@@ -298,7 +302,11 @@ class Setup:
                 "depth_offset": self.sensor.depth_offset,
                 "depth_scale": self.sensor.depth_scale,
                 # Left out without one: setups stored before there was one have none.
-                **({"edge": self.sensor.edge} if self.sensor.edge else {}),
+                **{
+                    key: value
+                    for key, value in (("edge", self.sensor.edge), ("view", self.sensor.view))
+                    if value
+                },
             },
             "landmarks": [list(place) for place in self.landmarks],
             "touching": {

@@ -17,8 +17,8 @@ import numpy as np
 
 from palpate.diagnosis.forward.loading_history import LoadingHistory
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.history_stress import constant_stress_force, shear_stress
-from palpate.fem.material_points import material_points
+from palpate.fem.history.history_stress import constant_stress_force, shear_stress
+from palpate.fem.history.material_points import material_points
 from palpate.fem.model import BlockModel
 from palpate.fem.strain_tensors import cauchy_green, from_log_strain, log_strain
 from palpate.foundation.arrays import FloatArray

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
 from palpate.diagnosis.inference.noise.rest_cloud import RestCloud
 from palpate.diagnosis.inference.noise.rest_evidence import RestEvidence
-from palpate.diagnosis.observation.force_only import pushed_places
+from palpate.diagnosis.observation.force_only import contact_places, pushed_places
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.experiment import Experiment
 from palpate.mesh.default_meshes import Use, default_mesh
@@ -50,7 +50,7 @@ def problem_of_dataset(
 def _meshes(setup: Setup, data: Sequence[Observations]) -> tuple[Meshing, Meshing, Meshing]:
     """Return the mesh of the diagnosis, the fine one and the coarse one."""
     radius = setup.tool.radius
-    places = pushed_places(data, setup)[0]
+    places = contact_places(data, setup)
     default, fine, coarse = (
         default_mesh(use, setup.geometry, radius, places)
         for use in (Use.REPLAY, Use.FINE, Use.SCREEN)

@@ -27,7 +27,7 @@ from palpate.foundation.progress import Report, silent
 from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
-__all__ = ["deepest_rows", "observe_each", "observe_forces", "pushed_places"]
+__all__ = ["contact_places", "deepest_rows", "observe_each", "observe_forces", "pushed_places"]
 
 _NO_POINTS = np.empty((0, 3))
 
@@ -153,6 +153,24 @@ def pushed_places(data: Ordered[Observations], setup: Setup) -> tuple[FloatArray
             places.append(first[0] - distance[0] * normal[0])
             normals.append(normal[0])
     return np.array(places).reshape(-1, 3), np.array(normals).reshape(-1, 3)
+
+
+def contact_places(data: Ordered[Observations], setup: Setup) -> FloatArray:
+    """Places (k, 3) [m] of the stated surface that the tool touches in any sequence.
+
+    Of places in sequences with clouds that are closer to one another than the tool's diameter, one
+    is enough.
+    """
+    kept = list(pushed_places(data, setup)[0])
+    for item in data:
+        if not item.force_only:
+            centres = item.centres(setup)
+            touching = setup.geometry.gap(centres, setup.tool.radius) < CLEARANCE
+            distance, normals = setup.geometry.facing(centres[touching])
+            for place in centres[touching] - distance[:, None] * normals:
+                if all(np.linalg.norm(place - other) > 2 * setup.tool.radius for other in kept):
+                    kept.append(place)
+    return np.array(kept).reshape(-1, 3)
 
 
 def deepest_rows(item: Observations) -> list[int]:

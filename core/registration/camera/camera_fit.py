@@ -43,6 +43,8 @@ class CameraFit:
         warnings: for a person.
         ambiguity: the warning that other poses fit as well; empty where none does.
         alternatives: of other poses that fit about as well, without alternatives of their own.
+        view: (x/z, y/z) of the corners of the convex part of the image in which the rest cloud
+            lies, camera frame; empty for a block, whose visible sides count wholly.
     """
 
     phantom_from_camera: Transform
@@ -61,6 +63,7 @@ class CameraFit:
     warnings: tuple[str, ...]
     ambiguity: str = ""
     alternatives: tuple[CameraFit, ...] = ()
+    view: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of(

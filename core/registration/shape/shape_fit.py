@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
@@ -16,10 +17,10 @@ from palpate.registration.shape.pose_search import Hypothesis, distinct, find_po
 from palpate.registration.shape.ray_fit import PARTS, refined, weighted
 from palpate.registration.shape.seen_body import SeenBody
 from palpate.registration.shape.seen_rays import SeenRays
-from palpate.registration.uncertainty import estimate, make_patches
+from palpate.registration.uncertainty import Patches, PoseEstimate, estimate, make_patches
 from palpate.setup.phantom_geometry import Geometry
 
-__all__ = ["fit_shape_camera", "refine_shape_camera"]
+__all__ = ["fit_shape_camera", "refine_shape_camera", "settled_pose"]
 
 _POOR = 1.3
 """Misfit of depth from which on the plane that was found may be no table [variances]."""
@@ -139,7 +140,45 @@ def _fitted(
     cloud: FloatArray, body: SeenBody, pose: Transform, depth_sigma: float, view: SeenRays
 ) -> CameraFit:
     """Refine a pose along rays, with covariance and statistics."""
-    gate, pivot, table = max(2.0 * depth_sigma, 3.0e-3), body.middle, view.table
+    gate, pivot, table = _gate(depth_sigma), body.middle, view.table
+    pose, last, patches = _settled(cloud, body, pose, gate, table=table)
+    found, weights = weighted(cloud, body, pose, gate, table=table)
+    fit = CameraFit.of(pose, last, found, weights, PARTS, pivot=pivot, lever=body.reach)
+    explained = view.explained(body, pose @ view.to_camera)
+    return replace(fit, noise=patches.noise, explained=explained, view=_seen_part(cloud))
+
+
+def _seen_part(cloud: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Corners (x/z, y/z) of the convex part of the image in which a cloud (n, 3) [m] lies."""
+    image = cloud[:, :2] / cloud[:, 2:]
+    return tuple((float(u), float(v)) for u, v in image[ConvexHull(image).vertices])
+
+
+def settled_pose(
+    cloud: FloatArray, body: SeenBody, start: Transform, depth_sigma: float, *, table: bool
+) -> Transform:
+    """Refine a pose that is nearly right: the last step of a registration, without a covariance.
+
+    Args:
+        cloud: (n, 3) [m], camera frame.
+        body: as stated.
+        start: phantom_from_camera.
+        depth_sigma: stated accuracy of depth [m].
+        table: whether the body stands on a table in z = 0.
+    """
+    return _settled(cloud, body, start, _gate(depth_sigma), table=table)[0]
+
+
+def _gate(depth_sigma: float) -> float:
+    """Largest error [m] along the normal of a point of the phantom."""
+    return max(2.0 * depth_sigma, 3.0e-3)
+
+
+def _settled(
+    cloud: FloatArray, body: SeenBody, pose: Transform, gate: float, *, table: bool
+) -> tuple[Transform, PoseEstimate, Patches]:
+    """Refine a pose along rays, then by averages that share a smooth error of the camera."""
+    pivot = body.middle
     pose = refined(cloud, body, pose, gate, table=table)
     for _ in range(2):
         found, weights = weighted(cloud, body, pose, gate, table=table)
@@ -147,10 +186,7 @@ def _fitted(
         last = estimate(patches)
         # Along weak directions the outline knows more than the points on the surface do.
         pose = small_motion(last.settled(body.reach), pivot) @ pose
-    found, weights = weighted(cloud, body, pose, gate, table=table)
-    fit = CameraFit.of(pose, last, found, weights, PARTS, pivot=pivot, lever=body.reach)
-    explained = view.explained(body, pose @ view.to_camera)
-    return replace(fit, noise=patches.noise, explained=explained)
+    return pose, last, patches
 
 
 def _away(pose: Transform, other: Transform, body: SeenBody) -> float:

@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.setup.fixed_region import Plane
-from palpate.setup.shape import Shape
+from palpate.setup.free_form.fixed_region import Plane
+from palpate.setup.free_form.shape import Shape
 
 __all__ = ["FAMILIES", "draw_shape"]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from palpate.fem.constitutive.elastic import Law
-from palpate.fem.history_stress import ConstantStress, constant_stress_force, shear_stress
-from palpate.fem.material_points import CellPoints, QuadraturePoints
+from palpate.fem.history.history_stress import ConstantStress, constant_stress_force, shear_stress
+from palpate.fem.history.material_points import CellPoints, QuadraturePoints
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.newton import Outcome, solve
 from palpate.fem.strain_tensors import cauchy_green

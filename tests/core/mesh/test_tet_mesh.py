@@ -13,7 +13,7 @@ from shapes import box_surface, dome, filled_box
 from palpate.foundation.errors import MeshError, SetupError
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.gmsh_fill import TetSpec, fill
-from palpate.setup.fixed_region import Faces
+from palpate.setup.free_form.fixed_region import Faces
 from palpate.setup.setup import Box, Detachment, Layer, Material, Setup, Shape, Support, Tool
 
 SIZE = (0.06, 0.04, 0.03)
@@ -47,7 +47,7 @@ def test_point_outside_takes_the_value_of_the_nearest_surface_point():
 
 
 def test_mesh_is_fine_only_near_the_tool():
-    mesh = fill(SETUP.shape, TetSpec.along(TOUCH, 5e-3, spacing=1e-3, coarsest=5e-3))
+    mesh = fill(SETUP.stated_shape, TetSpec.along(TOUCH, 5e-3, spacing=1e-3, coarsest=5e-3))
     edges = mesh.corners[mesh.tetrahedra]
     longest = np.linalg.norm(edges[:, :, None] - edges[:, None], axis=3).max(axis=(1, 2))
     away = np.linalg.norm(edges.mean(axis=1) - (0.01, 0.0, SIZE[2]), axis=1)
@@ -57,10 +57,10 @@ def test_mesh_is_fine_only_near_the_tool():
 
 def test_same_surface_and_motion_give_the_same_mesh():
     spec = TetSpec.along(TOUCH, 5e-3, spacing=2e-3)
-    first = fill(SETUP.shape, spec)
+    first = fill(SETUP.stated_shape, spec)
     assert fill(Shape(*box_surface(SIZE)), TetSpec.along(TOUCH + 1e-5, 5e-3, spacing=2e-3)) is first
     fill.cache_clear()
-    again = fill(SETUP.shape, spec)
+    again = fill(SETUP.stated_shape, spec)
     assert (
         again is not first
         and np.array_equal(again.nodes, first.nodes)
@@ -122,7 +122,7 @@ def test_gmsh_leaves_signal_handlers_alone_and_no_model_behind():
 def test_missing_gmsh_is_reported_with_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     with pytest.raises(SetupError, match=r'meshed by Gmsh.*pip install "palpate\[shapes\]"'):
-        fill(SETUP.shape, TetSpec(path=(), radius=1e-3, spacing=7.7e-3, coarsest=7.7e-3))
+        fill(SETUP.stated_shape, TetSpec(path=(), radius=1e-3, spacing=7.7e-3, coarsest=7.7e-3))
 
 
 def test_failure_of_gmsh_is_reported_with_the_file(monkeypatch):
@@ -133,7 +133,7 @@ def test_failure_of_gmsh_is_reported_with_the_file(monkeypatch):
     with pytest.raises(
         MeshError, match=r"^surface: Gmsh found no tetrahedra .*no elements in volume 1.*0.0066 m"
     ):
-        fill(SETUP.shape, TetSpec(path=(), radius=1e-3, spacing=6.6e-3, coarsest=7e-3))
+        fill(SETUP.stated_shape, TetSpec(path=(), radius=1e-3, spacing=6.6e-3, coarsest=7e-3))
 
 
 @pytest.mark.parametrize(("spacing", "coarsest"), [(0.0, 1e-3), (2e-3, 1e-3), (1e-3, 2.0)])
@@ -170,7 +170,7 @@ def test_body_as_dict_has_plain_values():
 
 
 def test_points_on_the_surface_are_spread_evenly_and_not_on_the_base():
-    points = SETUP.shape.surface_points()
+    points = SETUP.stated_shape.surface_points()
     x, y, z = SIZE
     assert (points[:, 2] > 0).all()
     on_top = np.isclose(points[:, 2], z)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,15 @@ from small_dataset import ply_bytes
 
 from benchmarks.shape_registration import Seen, look
 from palpate.dataset import Dataset, open_dataset
-from palpate.experiment import Experiment
-from palpate.foundation.errors import RegistrationError
+from palpate.effects.geometry import GeometryScale
+from palpate.foundation.frames import Transform
+from palpate.measurement.camera_model import camera_model_for
 from palpate.registration.point_pairs import register_pairs
 from palpate.registration.registration import register
+from palpate.registration.rest_fit import refine_rest_cloud
 from palpate.registration.shape.seen_body import SeenBody
-from palpate.setup.shape import Shape
+from palpate.setup.free_form.shape import Shape
+from palpate.setup.setup import Sensor, Setup, Tool
 from palpate.synthetic.bench.shape_families import draw_shape
 
 PLACE = np.array([0.024, 0.008])
@@ -90,8 +94,19 @@ def test_clicks_are_refined_on_a_free_form(tmp_path: Path) -> None:
     assert np.linalg.norm(apart) < 2e-3
 
 
-def test_clouds_of_a_free_form_are_not_compared_yet(tmp_path: Path) -> None:
-    shape = draw_shape("liver", 0)
-    dataset = _write(tmp_path, shape, look(SeenBody(shape), 4, table=True))
-    with pytest.raises(RegistrationError, match="can be registered, but not compared yet"):
-        Experiment.of(dataset)
+def test_registration_error_of_another_size_is_inverted() -> None:
+    stated = draw_shape("liver", 0)
+    setup = Setup(geometry=stated, tool=Tool(radius=5e-3))
+    longer = GeometryScale(scale_x=1.04, scale_y=0.97, scale_z=1.03).apply(setup)
+    seen = look(SeenBody(longer.geometry), 4, table=True)
+    fit = refine_rest_cloud(seen.cloud, stated, seen.pose, 1e-3)
+    sensor = Sensor(depth_sigma=1e-3, view=fit.view)
+    registered = replace(longer, sensor=sensor, phantom_from_camera=fit.phantom_from_camera)
+    places = stated.surface_points()
+
+    def off(pose: Transform) -> float:
+        apart = (pose @ seen.pose.inverse()).apply(places) - places
+        return float(np.linalg.norm(apart, axis=1).mean())
+
+    assert off(fit.phantom_from_camera) > 1.5e-3
+    assert off(camera_model_for(registered, reference=True).pose) < 0.4e-3

@@ -16,7 +16,7 @@ from palpate.gradients.displacement_changes import displacement_changes
 from palpate.mesh.gmsh_fill import TetSpec
 from palpate.replay.mesh_convergence import mesh_errors
 from palpate.replay.replay import Replay, replay, require_converged
-from palpate.setup.fixed_region import Painted
+from palpate.setup.free_form.fixed_region import Painted
 from palpate.setup.setup import Detachment, Load, Material, Setup, Shape, Support, Tool
 
 BOX = SETUP.box.size

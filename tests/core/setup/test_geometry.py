@@ -7,8 +7,8 @@ import pytest
 from shapes import box_surface
 
 from palpate.setup.box import Box
+from palpate.setup.free_form.shape import Shape
 from palpate.setup.phantom_geometry import Geometry
-from palpate.setup.shape import Shape
 
 SIZE = (0.0687, 0.0393, 0.0358)
 X, Y, TOP = SIZE[0] / 2, SIZE[1] / 2, SIZE[2]

@@ -7,8 +7,8 @@ import pytest
 from shapes import box_surface, dome
 
 from palpate.setup.box import Box
+from palpate.setup.free_form.shape import Shape
 from palpate.setup.phantom_geometry import Surface
-from palpate.setup.shape import Shape
 
 SIZE = (0.0687, 0.0393, 0.0358)
 BLOCK = Box(size=SIZE).surface()
@@ -63,6 +63,25 @@ def test_tangents_span_the_surface(surface: Surface) -> None:
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     np.testing.assert_allclose(np.cross(first, second), normal, atol=1e-9)
+
+
+def test_surface_of_a_longer_body_has_the_same_patches_at_their_places() -> None:
+    stated = dome((0.04, 0.03, 0.025))
+    factors = np.array([1.05, 0.96, 1.1])
+    longer = stated.scaled(factors)
+    surface = longer.surface(stated=stated)
+    assert surface.patches == DOME.patches
+    np.testing.assert_allclose(surface.on_stated(surface.vertices), DOME.vertices, atol=1e-12)
+    distance, normals = longer.facing(surface.patch_centres)
+    assert np.abs(distance).max() < 1e-5
+    assert np.einsum("pi,pi->p", normals, surface.patch_normals).min() > 0.9
+    first, second = surface.tangents(middles(surface), surface.side)
+    a, b, c = surface.vertices[surface.faces.T]
+    across = np.cross(b - a, c - a)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.cross(first, second), across, atol=1e-6)
+    assert longer.held.sum() == stated.held.sum()
+    assert longer.height == pytest.approx(0.0275)
 
 
 def test_dome_has_one_side_that_ends_at_its_base() -> None:

@@ -9,9 +9,9 @@ from PIL import Image
 from shapes import box_surface
 
 from palpate.foundation.errors import MeshError
-from palpate.setup.fixed_region import Faces, Painted, Plane
+from palpate.setup.free_form.fixed_region import Faces, Painted, Plane
+from palpate.setup.free_form.shape import load_shape
 from palpate.setup.setup import Shape
-from palpate.setup.shape import load_shape
 
 SIZE = (0.06, 0.04, 0.03)
 

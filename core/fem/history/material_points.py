@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from palpate.fem.history.voxel_points import VoxelPoints
 from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
@@ -20,6 +21,7 @@ from palpate.mesh.box_mesh import BoxMesh, GridSpec
 from palpate.mesh.graded_mesh import Grading
 from palpate.mesh.grid_axes import even_axis
 from palpate.mesh.protocol import Mesh, Meshing
+from palpate.mesh.push_meshes import PushMeshSpec
 from palpate.setup.setup import Setup
 
 __all__ = [
@@ -172,6 +174,8 @@ def _reading(cells: CellPoints, mesh: BoxMesh, axis: int) -> FloatArray:
 
 def material_points(setup: Setup, grid: Meshing, mesh: Mesh) -> MaterialPoints:
     """The points for a body with this mesh specification, of which `mesh` is one."""
+    if isinstance(grid, PushMeshSpec) and len(grid.places) > 1:
+        return VoxelPoints(setup, grid.spacing)
     spacing = grid.spacing if isinstance(grid, Grading | GridSpec) else None
     if spacing is None:
         return QuadraturePoints(mesh)

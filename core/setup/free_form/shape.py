@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
-from palpate.setup.distance_grid import DistanceGrid
-from palpate.setup.fixed_region import FixedRegion, Plane
-from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry
-from palpate.setup.shape_surface import ShapeSurface
-from palpate.setup.surface_file import check_surface, read_surface
+from palpate.setup.free_form.distance_grid import DistanceGrid
+from palpate.setup.free_form.fixed_region import Faces, FixedRegion, Plane
+from palpate.setup.free_form.shape_surface import ShapeSurface
+from palpate.setup.free_form.stretched_surface import StretchedSurface
+from palpate.setup.free_form.surface_file import check_surface, read_surface
+from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry, Surface
 
 __all__ = ["Shape", "load_shape"]
 
@@ -102,11 +103,18 @@ class Shape(Geometry):
         """Whether everything that is held lies in z = 0."""
         return bool(np.abs(self.corners[self.held][..., 2]).max() <= _FLAT)
 
+    def scaled(self, factors: FloatArray) -> Shape:
+        """The body whose coordinates are multiplied by these factors (3,) [1], held in the same
+        triangles.
+        """
+        x, y, z = (float(factor) for factor in factors)
+        return _scaled(self, (x, y, z))
+
     def nearest(self, points: FloatArray) -> FloatArray:
         """Points of the body (m, 3) [m] nearest to points (m, 3) [m]; points inside stay where they
         are.
         """
-        from palpate.setup.closest_point import nearest, winding_number
+        from palpate.setup.free_form.closest_point import nearest, winding_number
 
         _, places = nearest(np.ascontiguousarray(points, float), self.corners)
         inside = np.array(
@@ -124,7 +132,7 @@ class Shape(Geometry):
         Returns:
             distances (m,) [m], negative inside, and unit normals (m, 3).
         """
-        from palpate.setup.closest_point import nearest
+        from palpate.setup.free_form.closest_point import nearest
 
         number, places = nearest(np.ascontiguousarray(points, float), self.corners)
         normals = self._normals[number]
@@ -174,9 +182,10 @@ class Shape(Geometry):
         patch: float = PATCH,
         stated: Geometry | None = None,
         edge: float = LEAST_EDGE,
-    ) -> ShapeSurface:
+    ) -> Surface:
         """The part of the surface that is not held, see `Geometry.surface`."""
-        return ShapeSurface(self, self.corners[~self.held], spacing, patch, edge)
+        own = _surface(self if stated is None else stated, spacing, patch, edge)
+        return own if stated is None else StretchedSurface(self, own)
 
     def as_dict(self) -> dict[str, object]:
         """Plain values for JSON, SI units."""
@@ -186,6 +195,17 @@ class Shape(Geometry):
             "triangles": len(self.triangles),
             "held": int(self.held.sum()),
         }
+
+
+@lru_cache(maxsize=32)
+def _scaled(shape: Shape, factors: tuple[float, float, float]) -> Shape:
+    fixed = Faces.of(np.flatnonzero(shape.held))
+    return Shape(shape.vertices * factors, shape.triangles, fixed, shape.name)
+
+
+@lru_cache(maxsize=8)
+def _surface(shape: Shape, spacing: float, patch: float, edge: float) -> ShapeSurface:
+    return ShapeSurface(shape, shape.corners[~shape.held], spacing, patch, edge)
 
 
 def load_shape(path: Path, *, scale: float = 1.0, fixed: FixedRegion | None = None) -> Shape:
