@@ -12,7 +12,7 @@ from palpate.mesh.gmsh_fill import TetSpec, fill
 from palpate.mesh.tet_mesh import TetMesh
 from palpate.setup.free_form.fixed_region import FixedRegion, Plane
 from palpate.setup.setup import Shape
-from palpate.synthetic.bench.organ_shape import write_surface
+from palpate.synthetic.bodies.organ_shape import write_surface
 
 __all__ = ["box_surface", "dome", "filled_box", "write_felt_shape"]
 

@@ -125,8 +125,7 @@ def replay(
     from palpate.dataset import open_dataset
     from palpate.dataset.provenance import made_from
     from palpate.mesh.box_mesh import GridSpec, box_mesh
-    from palpate.mesh.graded_mesh import REPLAY_GRID
-    from palpate.mesh.protocol import Meshing
+    from palpate.mesh.default_meshes import Use, motion_mesh
     from palpate.replay.mesh_convergence import mesh_errors
 
     even = None if grid == "graded" else GridSpec.parse(grid)
@@ -137,8 +136,8 @@ def replay(
     with progress(f"replay {sequence}") as report:
         relation = registering.register(opened, part(report, 0.0, 0.1))
         setup = registering.setup_from(opened, relation)
-        spec: Meshing = even or REPLAY_GRID.for_tool(setup.tool.radius)
         centres = setup.phantom_from_robot.apply(kinematics.position_at(times))
+        spec = even or motion_mesh(Use.REPLAY, setup.geometry, setup.tool.radius, centres)
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
         errors = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
     mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_NODES))

@@ -47,7 +47,6 @@ from palpate.experiment import Experiment
 from palpate.foundation.errors import RunError
 from palpate.foundation.progress import Report, part, rising, silent
 from palpate.mesh.default_meshes import Use, default_spec
-from palpate.mesh.graded_mesh import PAGE_GRID
 from palpate.recording.record_sequence import record
 from palpate.setup.setup import Sensor, Setup
 
@@ -242,7 +241,7 @@ def _with_pictures(
         model = findings.best.model if findings.best else findings.baseline
         patterns = error_patterns(evaluator, fitted, findings.baseline, model)
         patterns.save(making / "patterns.npz")
-        draw_patterns(patterns, problem.surface, making / "pictures" / "patterns.png")
+        draw_patterns(patterns, making / "pictures" / "patterns.png")
         return result
     result, pushes, shown = with_palpation(result, evaluator, fitted, findings)
     lump = next((cause for cause in result["causes"] if "cover" in cause), None)
@@ -256,7 +255,7 @@ def _recordings(
 ) -> list[Future[str]]:
     """Begin to record every sequence with clouds under the stated and the extended setup."""
     dataset, stated = experiment.dataset, experiment.stated
-    page = PAGE_GRID.for_tool(stated.tool.radius)
+    page = experiment.mesh(Use.PAGE, experiment.sequences)
     return [
         pool.run(
             record,

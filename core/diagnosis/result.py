@@ -14,7 +14,6 @@ from palpate.diagnosis.report.error_patterns import ErrorPatterns, patterns_figu
 from palpate.foundation.errors import RunError
 from palpate.foundation.figure import save_figure
 from palpate.foundation.progress import Report, silent
-from palpate.setup.setup import Box
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,9 +76,7 @@ class DiagnosisResult:
                 f"{self.folder} has no patterns.npz: this diagnosis compared forces alone",
                 file=str(patterns),
             )
-        size = self.model["setup"]["geometry"]["size"]
-        x, y, z = (float(length) for length in size)
-        figure = patterns_figure(ErrorPatterns.load(patterns), Box(size=(x, y, z)).surface())
+        figure = patterns_figure(ErrorPatterns.load(patterns))
         if file is not None:
             save_figure(figure, Path(file))
         return figure

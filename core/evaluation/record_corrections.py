@@ -23,7 +23,7 @@ from palpate.measurement.phantom_drift import recorded_camera
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.tool_pose import ToolShaft, tool_poses
 from palpate.measurement.touch_correction import touch_correction
-from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.mesh.default_meshes import Use
 from palpate.mesh.protocol import Meshing
 from palpate.recording.record_sequence import compare_with_clouds
 from palpate.recording.saved_model import setup_of_model
@@ -63,7 +63,7 @@ def record_corrections(
     setup = setup_of_model(stated, model)
     corrected = _CorrectedModel(
         setup=setup,
-        grid=PAGE_GRID.for_tool(stated.tool.radius),
+        grid=experiment.mesh(Use.PAGE, frames),
         network=network,
         stated=stated,
         cleaner=experiment.cleaner.allowing(setup.tool.radius),

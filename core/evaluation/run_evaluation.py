@@ -28,7 +28,7 @@ from palpate.evaluation.summary_sentence import summary_sentence
 from palpate.experiment import Experiment
 from palpate.foundation.errors import DiagnosisError, RunError
 from palpate.foundation.progress import Report, part, silent
-from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.mesh.default_meshes import Use
 from palpate.mesh.protocol import Meshing
 from palpate.recording.saved_model import effects_from, setup_of_model
 from palpate.setup.setup import Setup
@@ -109,7 +109,7 @@ class EvaluationData:
         )
         trained = kinds_in(dataset, (*dataset.config.train, *dataset.config.validation), stated)
         kinds = kinds_of_pushes(dataset, data, stated)
-        return cls(dataset, stated, data, kinds, trained, PAGE_GRID.for_tool(stated.tool.radius))
+        return cls(dataset, stated, data, kinds, trained, experiment.mesh(Use.PAGE, tested))
 
     def compute_ladder(
         self,

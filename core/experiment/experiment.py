@@ -30,7 +30,7 @@ from palpate.measurement.phantom_drift import align_sequences
 from palpate.measurement.segmentation import Cleaner, cleaner_for
 from palpate.measurement.tool_pose import ToolShaft, find_shaft
 from palpate.measurement.touch_correction import touch_correction
-from palpate.mesh.default_meshes import Use, default_mesh
+from palpate.mesh.default_meshes import Use, motion_mesh
 from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import Registration, setup_from
 from palpate.registration.registration import register as relate_frames
@@ -132,7 +132,21 @@ class Experiment:
 
     def grid(self, centres: FloatArray) -> Meshing:
         """The mesh of a replay of tool centres (f, 3) [m], phantom frame."""
-        return default_mesh(Use.REPLAY, self.setup.geometry, self.setup.tool.radius, centres)
+        stated = self.setup.stated_geometry
+        return motion_mesh(Use.REPLAY, stated, self.setup.tool.radius, centres)
+
+    def mesh(self, use: Use, sequences: Iterable[str]) -> Meshing:
+        """The mesh of a use for replays of some sequences, whatever the model."""
+        centres = [np.zeros((1, 3))]
+        for name in sequences:
+            kinematics = self.dataset.sequence(name).kinematics
+            centres.append(
+                self.stated.phantom_from_robot.apply(
+                    kinematics.position_at(_thinned(np.asarray(kinematics.time)))
+                )
+            )
+        every = np.concatenate(centres[1:] or centres)
+        return motion_mesh(use, self.stated.geometry, self.stated.tool.radius, every)
 
     def observe(
         self,

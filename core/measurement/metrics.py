@@ -33,10 +33,12 @@ def _dense(size: tuple[float, float, float]) -> FloatArray:
 
 def supersampled(frame: Equilibrium, surface: Surface) -> FloatArray:
     """Vertices (v, 3) [m] of the 13x5x5 grid's free surface, super-sampled three-fold by linear
-    interpolation.
+    interpolation; of a body that is no block, the vertices of its surface.
 
     The paper's grid is a sampling of the mesh that is solved.
     """
+    if not surface.geometry.is_block:
+        return frame.move(surface.vertices)
     size = surface.geometry.size
     coarse = box_mesh(size, PAPER_GRID)
     displacement = frame.move(coarse.nodes) - coarse.nodes

@@ -20,12 +20,13 @@ from palpate.measurement.patch_averages import PatchMeans, patch_means
 from palpate.measurement.segmentation import Cleaner, cleaner_for
 from palpate.measurement.surface_gaps import gaps
 from palpate.measurement.tool_pose import ToolShaft, find_shaft, tool_poses
-from palpate.mesh.graded_mesh import SCREEN_GRID
+from palpate.mesh.default_meshes import Use, default_mesh
+from palpate.mesh.protocol import Meshing
 from palpate.registration.registration import Registration, setup_from
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import rest
 from palpate.setup.phantom_geometry import Surface
-from palpate.setup.setup import Setup, Shape
+from palpate.setup.setup import Setup
 
 __all__ = ["PhantomDrift", "align_sequences", "measure_drift", "recorded_camera", "shift_sequences"]
 
@@ -121,15 +122,12 @@ def measure_drift(dataset: Dataset, registration: Registration) -> dict[str, Flo
     They are relative to the sequence with the smallest one: a displacement common to all is a
     motion of the camera, not of the block.
     """
-    if isinstance(dataset.geometry, Shape) or not dataset.has_rest:
+    if not dataset.has_rest:
         return {}
     repaired = registration.repaired
     setup = setup_from(dataset, repaired)
     cleaner, shaft = cleaner_for(dataset, repaired), find_shaft(dataset, repaired)
-    bare, surface = (
-        rest(setup, SCREEN_GRID.for_tool(setup.tool.radius)),
-        setup.surface(patch=_PATCH),
-    )
+    bare, surface = (rest(setup, _resting_mesh(setup)), setup.surface(patch=_PATCH))
     cloud = dataset.rest_cloud()
     before = _means(setup, cloud[cleaner.clean(cloud).indices], np.zeros(3), bare, surface)
     found: dict[str, PhantomDrift] = {}
@@ -139,6 +137,12 @@ def measure_drift(dataset: Dataset, registration: Registration) -> dict[str, Flo
         if one is not None:
             found[name] = one
     return _significant(found)
+
+
+def _resting_mesh(setup: Setup) -> Meshing:
+    """A mesh of the untouched phantom, for its sag."""
+    top = np.array([[0.0, 0.0, setup.geometry.height]])
+    return default_mesh(Use.SCREEN, setup.geometry, setup.tool.radius, top)
 
 
 def _significant(found: Mapping[str, PhantomDrift]) -> dict[str, FloatArray]:

@@ -140,6 +140,10 @@ class BoxMesh:
         x, y, z = (axis * factor for axis, factor in zip(self.axes, factors, strict=True))
         return BoxMesh((x, y, z), self.focus * factors, self.order)
 
+    def on_axes(self, field: FloatArray) -> FloatArray:
+        """A nodal field (n, c) at the grid of `axes`: the nodes themselves."""
+        return field
+
     def __getstate__(self) -> dict[str, Any]:
         """Pickle only the defining fields; everything else is computed again on demand."""
         return {"axes": self.axes, "focus": self.focus, "order": self.order}

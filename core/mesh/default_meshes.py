@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
+
+import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID, Grading
 from palpate.mesh.protocol import Meshing
 from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES, PushMeshSpec
-from palpate.setup.phantom_geometry import Geometry
+from palpate.setup.phantom_geometry import CLEARANCE, Geometry
 
-__all__ = ["Use", "default_mesh", "default_spec"]
+__all__ = ["Use", "default_mesh", "default_spec", "motion_mesh", "touched_places"]
 
 
 class Use(Enum):
@@ -30,14 +33,44 @@ def default_spec(use: Use, geometry: Geometry, radius: float) -> Grading | PushM
     return (block if geometry.is_block else free_form).for_tool(radius)
 
 
-def default_mesh(use: Use, geometry: Geometry, radius: float, centres: FloatArray) -> Meshing:
+def default_mesh(use: Use, geometry: Geometry, radius: float, places: FloatArray) -> Meshing:
     """The mesh of a replay.
 
     Args:
         use: of the replay.
         geometry: of the phantom.
         radius: of the tool [m].
-        centres: (f, 3) of the tool [m], phantom frame, by which a free form's mesh is refined.
+        places: (k, 3) that are pushed [m], phantom frame; each gets a mesh of a free form.
     """
     spec = default_spec(use, geometry, radius)
-    return spec if isinstance(spec, Grading) else spec.at(centres)
+    return spec if isinstance(spec, Grading) else spec.at(places)
+
+
+def motion_mesh(use: Use, geometry: Geometry, radius: float, centres: FloatArray) -> Meshing:
+    """The mesh of a replay of tool centres (f, 3) [m], phantom frame, of which not all touch."""
+    if geometry.is_block:
+        return default_mesh(use, geometry, radius, centres)
+    places = touched_places(geometry, radius, centres)
+    if not len(places):
+        places = centres[[geometry.gap(centres, radius).argmin()]]
+    return default_mesh(use, geometry, radius, places)
+
+
+def touched_places(
+    geometry: Geometry, radius: float, centres: FloatArray, known: Sequence[FloatArray] = ()
+) -> FloatArray:
+    """Places (k, 3) [m] of the surface that a tool touches, farther apart than its diameter.
+
+    Args:
+        geometry: of the phantom.
+        radius: of the tool [m].
+        centres: (f, 3) of the tool [m], phantom frame.
+        known: places (3,) [m] that there are already; the result begins with them.
+    """
+    kept = list(known)
+    touching = centres[geometry.gap(centres, radius) < CLEARANCE]
+    distance, normals = geometry.facing(touching)
+    for place in touching - distance[:, None] * normals:
+        if all(np.linalg.norm(place - other) > 2 * radius for other in kept):
+            kept.append(place)
+    return np.array(kept).reshape(-1, 3)

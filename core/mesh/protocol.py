@@ -76,6 +76,15 @@ class Mesh(Protocol):
     def interpolate(self, field: FloatArray, points: FloatArray) -> FloatArray:
         """Interpolate a nodal field (n, c) at rest positions (m, 3) [m], as `locate` does."""
 
+    @property
+    def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Coordinates along x, y, z [m] of a grid over the body, for pictures of its inside."""
+
+    def on_axes(self, field: FloatArray) -> FloatArray:
+        """A nodal field (n, c) at the grid of `axes` (nz ny nx, c), x fastest; that of the nearest
+        place of the body outside.
+        """
+
     def scaled(self, factors: FloatArray) -> Mesh:
         """The same elements in a body whose coordinates are multiplied by these factors (3,)
         [1].

@@ -20,6 +20,8 @@ _SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 """Corners of a tetrahedron's sides, counter-clockwise from outside."""
 _QUARTERS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 """The four triangles between the six nodes of a side."""
+_GRIDDED = 2.5e-3
+"""Largest spacing of the grid on which a picture of the inside is drawn [m]."""
 _ON_THE_EDGE = 1e-9
 """A point of the surface may lie so far outside a tetrahedron by rounding, in barycentric
 coordinates [1]."""
@@ -113,6 +115,27 @@ class TetMesh:
     def near_focus(self) -> IntArray:
         """No nodes: the mesh does not follow the tool."""
         return np.empty(0, dtype=np.int64)
+
+    @cached_property
+    def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Coordinates along x, y, z [m] of an even grid over the body."""
+        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
+        x, y, z = (
+            np.linspace(first, last, 2 + int((last - first) / _GRIDDED))
+            for first, last in zip(low, high, strict=True)
+        )
+        return x, y, z
+
+    @cached_property
+    def _on_axes(self) -> tuple[IntArray, FloatArray]:
+        """Nodes and shape functions (m, 10) at the grid of `axes`."""
+        x, y, z = self.axes
+        rows, columns, layers = np.meshgrid(z, y, x, indexing="ij")
+        return self.locate(np.stack([layers.ravel(), columns.ravel(), rows.ravel()], axis=1))
+
+    def on_axes(self, field: FloatArray) -> FloatArray:
+        """A nodal field (n, c) at the grid of `axes` (nz ny nx, c), see `Mesh.on_axes`."""
+        return weighted_nodes(*self._on_axes, field)
 
     @cached_property
     def _frames(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -1,5 +1,5 @@
-"""Interior fields of a block in each frame of a recording: displacement and energy density of every
-node.
+"""Interior fields of a body in each frame of a recording: displacement and energy density on a
+grid, which is that of the nodes for a block.
 
 Meshes follow the tool, so that each frame stores its node coordinates, as three axes. Values
 between the nodes are interpolated linearly: that is enough for pictures, and quadratic shape
@@ -18,7 +18,6 @@ import numpy as np
 from palpate.fem.energy_density import nodal_density
 from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.mesh.box_mesh import BoxMesh
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
 
@@ -29,12 +28,12 @@ _PARTS = ("inside_counts", "inside_axes", "inside_moved", "inside_energy", "insi
 
 @dataclass(frozen=True, eq=False)
 class InteriorFields:
-    """Nodes of the block in each of f frames, phantom frame.
+    """Grid over the body in each of f frames, phantom frame.
 
     Attributes:
-        counts: (f, 3) nodes along x, y, z.
-        axes: their coordinates at rest in the stated block, frame after frame [m].
-        moved: (n, 3) displacement of all nodes [m], frame after frame, x fastest.
+        counts: (f, 3) grid points along x, y, z.
+        axes: their coordinates at rest in the stated body, frame after frame [m].
+        moved: (n, 3) displacement of all grid points [m], frame after frame, x fastest.
         energy: (n,) elastic energy density over E [1]; NaN in frames without equilibrium or with an
             inverted element.
         modulus: E as assumed [Pa].
@@ -48,7 +47,7 @@ class InteriorFields:
 
     @classmethod
     def of(cls, setup: Setup, frames: Sequence[Equilibrium]) -> Self:
-        """Compute the fields of a replay's frames on block meshes."""
+        """Compute the fields of a replay's frames."""
         counts: list[tuple[int, int, int]] = []
         axes: list[FloatArray] = []
         moved: list[FloatArray] = []
@@ -56,15 +55,15 @@ class InteriorFields:
         longer = setup.scale
         for frame in frames:
             mesh = frame.mesh
-            if not isinstance(mesh, BoxMesh):
-                raise TypeError("only a block's frames have axes")
-            counts.append(mesh.shape)
+            x, y, z = mesh.axes
+            counts.append((len(x), len(y), len(z)))
             axes.extend(axis / part for axis, part in zip(mesh.axes, longer, strict=True))
             # A correction on top of the equilibrium is included.
             places = frame.move(mesh.nodes)
-            moved.append(places - mesh.nodes / longer)
+            moved.append(mesh.on_axes(places - mesh.nodes / longer))
             with np.errstate(invalid="ignore", divide="ignore"):
-                energy.append(nodal_density(BlockModel(setup, mesh), places))
+                density = nodal_density(BlockModel(setup, mesh), places)
+            energy.append(mesh.on_axes(density[:, None])[:, 0])
         with np.errstate(over="ignore"):
             return cls(
                 np.array(counts, dtype=np.int32),

@@ -16,7 +16,7 @@ from palpate.effects import Effect
 from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
-from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.mesh.default_meshes import Use
 from palpate.recording.record_sequence import record
 from palpate.setup.setup import Setup
 
@@ -50,7 +50,7 @@ def replay_into(
     experiment = Experiment.of(dataset)
     stated = experiment.stated
     extended = experiment.with_effects(*effects).setup if effects else stated
-    grid = PAGE_GRID.for_tool(stated.tool.radius)
+    grid = experiment.mesh(Use.PAGE, names)
     (out / "replays").mkdir(parents=True)
     (out / "pictures").mkdir()
     with ProcessPool(min(workers, len(names))) as pool:

@@ -21,14 +21,14 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.touch_correction import touch_correction
-from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.mesh.default_meshes import Use
 from palpate.recording.interactive import InteractiveReplay
 from palpate.recording.interior_fields import InteriorFields
 from palpate.recording.record_sequence import ModelRecording, compare_with_clouds
 from palpate.recording.saved_model import setup_of_model, with_fitted_values
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import replay
-from palpate.setup.setup import Setup, Shape
+from palpate.setup.setup import Setup
 
 __all__ = ["FrameResolver", "ResolvedFrame", "open_resolver"]
 
@@ -80,9 +80,9 @@ class FrameResolver:
         dataset = open_dataset(folder).registered(
             AcceptedRegistration.from_json(registered) if registered else None
         )
-        if isinstance(dataset.geometry, Shape) or not len(dataset.sequence(sequence)):
+        if not len(dataset.sequence(sequence)):
             raise RunError(
-                f"{sequence} has no clouds of a block, so that there is nothing to compare with",
+                f"{sequence} has no clouds, so that there is nothing to compare with",
                 sequence=sequence,
             )
         self._experiment = Experiment.of(dataset)
@@ -92,7 +92,7 @@ class FrameResolver:
         self._sequence = self._experiment.dataset.sequence(sequence)
         self._clouds = np.asarray(clouds, dtype=int)
         self._times = np.asarray(self._sequence.cloud_times)[self._clouds]
-        self._grid = PAGE_GRID.for_tool(self.stated.tool.radius)
+        self._grid = self._experiment.mesh(Use.PAGE, [sequence])
         self._cleaned: dict[tuple[int, float], FloatArray] = {}
         self._last: tuple[int, Equilibrium] | None = None
 

@@ -12,10 +12,11 @@ import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.dataset.provenance import check_data, check_unchanged, made_from
+from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import PalpateError, RunError
 from palpate.foundation.progress import Report, part, silent
-from palpate.mesh.graded_mesh import REPLAY_GRID
+from palpate.mesh.default_meshes import Use, motion_mesh
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
 from palpate.sweep.executors import ReplayExecutor, make_executor, run_tasks
@@ -56,7 +57,7 @@ def run_sweep(
         store: folder of the replay cache, which all sweeps share.
         workers: number of local processes.
         scheduler: address of a dask scheduler, which is used instead of local processes.
-        grid: mesh protocol; REPLAY_GRID if None.
+        grid: mesh protocol; that of a replay if None.
         report: receives the progress.
 
     Raises RunError where the folder holds another sweep.
@@ -67,7 +68,7 @@ def run_sweep(
     stated, data = read_sweep_data(
         dataset, request.sequences, request.frames, part(report, 0.0, 0.05), request.space
     )
-    grid = grid or REPLAY_GRID.for_tool(stated.tool.radius)
+    grid = grid or _mesh_of(stated, data)
     executor = make_executor(workers, scheduler, data, grid)
     try:
         run = _SweepRun(
@@ -88,6 +89,15 @@ def run_sweep(
     _write(folder / "summary.json", summary)
     report(1.0, "done")
     return summary
+
+
+def _mesh_of(stated: Setup, data: Sequence[SweepSequence]) -> Meshing:
+    """The mesh of a replay of all sequences."""
+    centres = [
+        stated.phantom_from_robot.apply(smooth_centres(one.kinematics, one.times)) for one in data
+    ]
+    every = np.concatenate(centres)
+    return motion_mesh(Use.REPLAY, stated.geometry, stated.tool.radius, every)
 
 
 def _claim(folder: Path, content: dict[str, Any], made: dict[str, Any]) -> None:

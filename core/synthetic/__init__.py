@@ -1,12 +1,18 @@
 """The virtual bench: datasets with known hidden effects.
 
 `scenario` says what is hidden, `bench` has the block, the tool and the sensors, and `solver` is a
-finite-element solver with another mesh, element and material law than the replay. `make_dataset`
-and `make_palpation` write whole datasets with their truth beside them.
+finite-element solver with another mesh, element and material law than the replay. `make_dataset`,
+`make_palpation` and `make_shape_dataset` write whole datasets with their truth beside them.
 """
 
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
+from palpate.synthetic.make_shape_dataset import (
+    ON_SHAPES,
+    ShapeScenario,
+    draw_shape_scenario,
+    make_shape_dataset,
+)
 from palpate.synthetic.nuisances import (
     CAMERAS,
     FAULTS,
@@ -35,6 +41,7 @@ __all__ = [
     "FILTERS",
     "HIDDEN",
     "NUISANCES",
+    "ON_SHAPES",
     "PAPER_EFFECTS",
     "PAPER_SEED",
     "PAPER_SIZES",
@@ -47,13 +54,16 @@ __all__ = [
     "Palpation",
     "PaperSize",
     "Scenario",
+    "ShapeScenario",
     "Truth",
     "draw_disturbance",
     "draw_nuisances",
     "draw_palpation",
     "draw_scenario",
+    "draw_shape_scenario",
     "make_dataset",
     "make_palpation",
+    "make_shape_dataset",
     "paper_scenario",
     "read_truth",
     "truth_path",

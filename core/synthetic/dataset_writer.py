@@ -74,19 +74,30 @@ def write_touches(path: Path, names: list[str], positions: FloatArray) -> None:
 
 
 def write_config(
-    path: Path, name: str, scenario: Scenario, landmarks: dict[str, FloatArray], guess: Transform
+    path: Path,
+    name: str,
+    scenario: Scenario,
+    landmarks: dict[str, FloatArray],
+    guess: Transform | None,
+    surface: str = "",
 ) -> None:
-    """Write dataset.toml: the experimenter's beliefs, and a first guess of the camera's pose."""
-    matrix = ", ".join(
-        "[" + ", ".join(f"{value:.9f}" for value in row) + "]" for row in guess.matrix
-    )
+    """Write dataset.toml: the experimenter's beliefs.
+
+    Args:
+        path: of the file.
+        name: of the dataset.
+        scenario: what is believed.
+        landmarks: (3,) [m] by name.
+        guess: first guess of the camera's pose; None without.
+        surface: file of a free form's surface; empty for a block.
+    """
     lines = [
-        *_believed(name, scenario, "", landmarks),
+        *_believed(name, scenario, surface, landmarks),
         "[camera]",
         'name = "virtual depth camera"',
         "depth_sigma = 0.002",
         *([f"filters = {list(filters)}"] if (filters := scenario.declared_filters) else []),
-        f"to_phantom = [{matrix}]",
+        *([] if guess is None else [f"to_phantom = [{_rows(guess)}]"]),
         "",
         *_listed(
             {split: list(names) for split, names in scenario.splits.items()}
@@ -94,6 +105,10 @@ def write_config(
         ),
     ]
     path.write_text("\n".join(lines) + "\n")
+
+
+def _rows(pose: Transform) -> str:
+    return ", ".join("[" + ", ".join(f"{value:.9f}" for value in row) + "]" for row in pose.matrix)
 
 
 def write_felt_config(

@@ -30,7 +30,14 @@ from palpate.synthetic.nuisances.nuisance_chain import stated_centres
 from palpate.synthetic.scenario.scenario import STRAYED, Scenario
 from palpate.synthetic.scenario.truth_file import Truth
 
-__all__ = ["make_dataset", "motions"]
+__all__ = [
+    "TOUCH_NOISE",
+    "draw_camera",
+    "draw_camera_shift",
+    "make_dataset",
+    "motions",
+    "record_all",
+]
 
 TOUCH_NOISE = 0.15e-3
 """Standard deviation of a touch [m]."""
@@ -60,8 +67,8 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
     report(0.0, "letting the block settle")
     rest, settled, faces = rest_surface(scenario)
     block = (rest + settled, faces)
-    camera = _draw_camera(scenario, block, seen, rng)
-    shift = _camera_shift(scenario, rng)
+    camera = draw_camera(scenario, block, seen, rng)
+    shift = draw_camera_shift(scenario, rng)
     scene = CameraScene(block, None, np.array([0.0, 0.0, -1.0]), 1.0)
     write_ply(folder / "rest.ply", _rest_cloud(scenario, camera, scene, rest, seed, rng))
     _write_touches(folder, scenario, robot_from_phantom, (rest, settled), rng)
@@ -85,7 +92,7 @@ def _fill(folder: Path, scenario: Scenario, seed: int, workers: int, report: Rep
         )
         for place, motion in enumerate(motions(scenario, seen, seed))
     ]
-    return _record_all(jobs, workers, report)
+    return record_all(jobs, workers, report)
 
 
 def _rest_cloud(
@@ -106,7 +113,7 @@ def _rest_cloud(
     return nuisance_cloud(scenario.nuisances, camera, shown(camera, scene), 0.0, drawn)
 
 
-def _draw_camera(
+def draw_camera(
     scenario: Scenario, block: tuple[FloatArray, Any], seen: FloatArray, rng: np.random.Generator
 ) -> DepthCamera:
     noise = scenario.noise * rng.uniform(0.9, 1.1)
@@ -121,7 +128,7 @@ def _draw_camera(
     )
 
 
-def _record_all(jobs: list[SequenceJob], workers: int, report: Report) -> Truth:
+def record_all(jobs: list[SequenceJob], workers: int, report: Report) -> Truth:
     """Record all sequences and sum up the truth."""
     squares: list[float] = []
     shortened: dict[str, list[float]] = {}
@@ -217,7 +224,7 @@ def _records(jobs: list[SequenceJob], workers: int) -> Iterator[SequenceRecord]:
             raise
 
 
-def _camera_shift(scenario: Scenario, rng: np.random.Generator) -> Transform:
+def draw_camera_shift(scenario: Scenario, rng: np.random.Generator) -> Transform:
     """Motion of the camera after `rest.ply`: hidden magnitudes along random directions."""
     step, turn = rng.normal(size=(2, 3))
     hidden = scenario.hidden("camera_registration")

@@ -22,7 +22,8 @@ from palpate.foundation.progress import Report, silent
 from palpate.synthetic.atomic_write import write_atomically
 from palpate.synthetic.bench.force_sensor import FORCE_NOISE, ForceSensor
 from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
-from palpate.synthetic.bench.organ_shape import (
+from palpate.synthetic.bench.virtual_experiment import solve_motion
+from palpate.synthetic.bodies.organ_shape import (
     AXES,
     organ_block,
     organ_normals,
@@ -30,7 +31,8 @@ from palpate.synthetic.bench.organ_shape import (
     organ_surface,
     write_surface,
 )
-from palpate.synthetic.bench.virtual_experiment import solve_motion
+from palpate.synthetic.bodies.shape_mesher import lump_grading
+from palpate.synthetic.bodies.shape_pushes import spread_places
 from palpate.synthetic.dataset_writer import (
     write_felt_config,
     write_forces,
@@ -40,7 +42,7 @@ from palpate.synthetic.dataset_writer import (
 from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.scenario.truth_file import Truth
-from palpate.synthetic.solver.tet_block import TetBlock, TetGrading
+from palpate.synthetic.solver.tet_block import TetBlock
 
 __all__ = ["Body", "Palpation", "draw_palpation", "make_palpation"]
 
@@ -174,7 +176,8 @@ def _motions(palpation: Palpation, seed: int) -> list[MotionPlan]:
     found = []
     for name in names:
         rng = np.random.default_rng([seed, 33, *name.encode()])
-        places = _spread(_reachable(palpation, rng), palpation.pushes)
+        reachable = _reachable(palpation, rng)
+        places = reachable[spread_places(reachable, palpation.pushes)]
         found.append(_motion(palpation, name, places[rng.permutation(len(places))], rng))
     return found
 
@@ -190,18 +193,6 @@ def _reachable(palpation: Palpation, rng: np.random.Generator) -> FloatArray:
         np.column_stack([drawn * 1.3, np.full(400, 0.9)]) * (AXES[0], AXES[1], AXES[2])
     )
     return places[places[:, 2] > 0.4 * AXES[2]]
-
-
-def _spread(places: FloatArray, count: int) -> FloatArray:
-    """Choose `count` of the places (n, 3) far apart: each next one farthest from those before
-    (Gonzalez 1985).
-    """
-    chosen = [0]
-    away = np.linalg.norm(places - places[0], axis=1)
-    while len(chosen) < min(count, len(places)):
-        chosen.append(int(away.argmax()))
-        away = np.minimum(away, np.linalg.norm(places - places[chosen[-1]], axis=1))
-    return places[chosen]
 
 
 def _motion(
@@ -251,17 +242,10 @@ def _normals(palpation: Palpation, places: FloatArray) -> FloatArray:
     )
 
 
-def _organ(scenario: Scenario, push: PlannedPush, fine: float) -> TetBlock:
-    """Mesh the organ for one push, with small elements also in a lump."""
-    lump = scenario.hidden("stiff_inclusion")
-    within = None
-    if lump is not None:
-        radius = lump.value("radius")
-        centre = np.array([[lump.value(axis) for axis in "xyz"]])
-        within = TetGrading(
-            centre, np.array([1.1 * radius]), np.array([0.55 * radius]), coarse=1.0, growth=3.0
-        )
-    return organ_block(push.waypoints[-1:], 0.8 * scenario.tool_radius, fine, within)
+def _organ(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetBlock:
+    """Mesh the organ for its pushes, with small elements also in a lump."""
+    places = np.array([push.waypoints[-1] for push in pushes])
+    return organ_block(places, 0.8 * scenario.tool_radius, fine, lump_grading(scenario))
 
 
 def _record(

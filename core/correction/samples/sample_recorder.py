@@ -16,7 +16,7 @@ from palpate.measurement.camera_model import CameraModel
 from palpate.measurement.segmentation import Cleaner
 from palpate.measurement.tool_pose import ToolShaft
 from palpate.measurement.touch_correction import touch_correction
-from palpate.mesh.graded_mesh import PAGE_GRID
+from palpate.mesh.default_meshes import Use
 from palpate.mesh.protocol import Meshing
 from palpate.replay.equilibrium import Equilibrium
 from palpate.setup.setup import Setup
@@ -89,7 +89,7 @@ def recorder_for(
     return Recorder(
         dataset,
         setup,
-        grid or PAGE_GRID.for_tool(setup.tool.radius),
+        grid or experiment.mesh(Use.PAGE, experiment.sequences),
         body or Body.block(setup.box.size, nodes),
         experiment.cleaner.allowing(setup.tool.radius),
         experiment.shaft,

@@ -11,18 +11,28 @@ from palpate.dataset.tool_motion import ContactKind
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Setup
 
 __all__ = ["Push", "depth_reached", "pushes", "speed_reached"]
 
 _SIDES = {"top": (2, 1.0), "-x": (0, -1.0), "+x": (0, 1.0), "-y": (1, -1.0), "+y": (1, 1.0)}
+_SURFACE = "surface"
+"""Side of a push on a free form."""
 _NAMED = {
+    _SURFACE: "along the normal of the surface",
     "top": "on the top",
     "-x": "into the -x side",
     "+x": "into the +x side",
     "-y": "into the -y side",
     "+y": "into the +y side",
 }
+
+_UPRIGHT, _REACHED = np.cos(np.radians(32.0)), np.cos(np.radians(70.0))
+"""Height of a normal [1] from which a push counts as one from above, and from which a tool reaches
+the surface."""
+Touched = tuple[str, tuple[float, float, float], tuple[float, float, float]]
+"""Side, place [m] and unit vector into the body."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +41,8 @@ class Push:
 
     Attributes:
         kind: "top", "side" or "drag".
-        side: that is touched.
+        side: that is touched; "surface" of a free form.
+        into: unit vector into the body.
         place: (x, y, z) of the first touch [m], phantom frame.
         depth: of the ball in the block [m].
         along: way of a drag at that depth, (x, y, z) [m].
@@ -41,6 +52,7 @@ class Push:
 
     kind: ContactKind
     side: str
+    into: tuple[float, float, float]
     place: tuple[float, float, float]
     depth: float
     along: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -49,9 +61,8 @@ class Push:
 
     @property
     def direction(self) -> FloatArray:
-        """Unit vector into the block (3,)."""
-        axis, sign = _SIDES[self.side]
-        return np.asarray(-sign * np.eye(3)[axis])
+        """Unit vector into the body (3,)."""
+        return np.array(self.into)
 
     def centres(self, radius: float, late: float = 0.0) -> FloatArray:
         """Return the tool's centre when clouds are taken (4, 3) [m].
@@ -123,31 +134,33 @@ def speed_reached(data: Sequence[Observations], setup: Setup) -> float:
 def pushes(
     setup: Setup, depth: float, *, drags: bool, speed: float = 0.0, holds: Sequence[float] = (0.0,)
 ) -> list[Push]:
-    """Return candidates all over the reachable sides of the stated block.
+    """Return candidates all over the reachable surface of the stated body.
 
     Args:
         setup: as stated.
         depth: of each [m].
-        drags: whether drags are candidates.
+        drags: whether drags over a block's flat top are candidates.
         speed: of all [m/s], where clocks or history matter.
         holds: rests that are tried [s].
     """
+    geometry = setup.geometry
+    touched = _on_block(setup) if geometry.is_block else _on_free_form(geometry)
     straight = [
         Push(
-            kind="top" if side == "top" else "side",
+            kind="top" if -into[2] > _UPRIGHT else "side",
             side=side,
+            into=into,
             place=place,
             depth=depth,
             speed=speed,
             hold=hold,
         )
-        for side in _SIDES
-        for place in _places(setup, side)
+        for side, place, into in touched
         for hold in holds
     ]
     if not drags:
         return straight
-    low, high = np.array(setup.box.size[:2]) / -2, np.array(setup.box.size[:2]) / 2
+    low, high = geometry.low[:2], geometry.high[:2]
     dragged = []
     for push in straight:
         for way in np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]) * CRITERIA.design.drag_length:
@@ -162,9 +175,32 @@ def pushes(
     return straight + dragged[:: max(1, len(dragged) // 8)]
 
 
+def _on_block(setup: Setup) -> list[Touched]:
+    """Return places all over the sides of a block."""
+    found = list[Touched]()
+    for side, (axis, sign) in _SIDES.items():
+        x, y, z = (-sign * np.eye(3)[axis]).tolist()
+        found += [(side, place, (x, y, z)) for place in _places(setup, side)]
+    return found
+
+
+def _on_free_form(geometry: Geometry) -> list[Touched]:
+    """Return places all over a free form where its surface looks upwards."""
+    found, kept = list[Touched](), list[FloatArray]()
+    places = geometry.surface_points()
+    normals = geometry.facing(places)[1]
+    for place, normal in zip(places, normals, strict=True):
+        near = any(np.linalg.norm(place - other) < CRITERIA.design.spacing for other in kept)
+        if normal[2] > _REACHED and not near:
+            kept.append(place)
+            (x, y, z), (u, v, w) = place.tolist(), (-normal).tolist()
+            found.append((_SURFACE, (x, y, z), (u, v, w)))
+    return found
+
+
 def _places(setup: Setup, side: str) -> list[tuple[float, float, float]]:
     """Return the places of a side: a grid on the top, one line on the others."""
-    size, margin = np.array(setup.box.size), CRITERIA.design.margin * setup.tool.radius
+    size, margin = np.array(setup.geometry.size), CRITERIA.design.margin * setup.tool.radius
 
     def spread(axis: int) -> FloatArray:
         half = max(size[axis] / 2 - margin, 0.0)

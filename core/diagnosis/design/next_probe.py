@@ -27,7 +27,9 @@ from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import Identifiability
 from palpate.diagnosis.search.inclusion_grid import inclusion_places
 from palpate.effects import Effect, Slot
+from palpate.foundation.arrays import FloatArray
 from palpate.measurement.camera_model import camera_model_for
+from palpate.mesh.default_meshes import Use, default_mesh
 
 __all__ = ["Advice", "Pair", "next_probe", "pairs_of"]
 
@@ -113,7 +115,7 @@ def next_probe(
         speed=speed,
         holds=(0.0, CRITERIA.design.hold) if memory else (0.0,),
     )
-    scene = _scene(evaluator, findings)
+    scene = _scene(evaluator, findings, np.array([push.place for push in tried]))
     pending = [
         evaluator.workers.run(nats_of, scene, [pair.models for pair in pairs], push)
         for push in tried
@@ -127,8 +129,11 @@ def next_probe(
     ]
 
 
-def _scene(evaluator: Evaluator, findings: Findings) -> Scene:
-    """Return what all candidate pushes share, with the visibility so far."""
+def _scene(evaluator: Evaluator, findings: Findings, places: FloatArray) -> Scene:
+    """Return what all candidate pushes at these places (k, 3) [m] share, with the visibility so
+    far.
+    """
+    setup = evaluator.problem.setup
     predictions, surface = (
         [item for item in findings.baseline.predictions if not item.force_only],
         evaluator.problem.surface,
@@ -143,7 +148,7 @@ def _scene(evaluator: Evaluator, findings: Findings) -> Scene:
         variance=patch_variance(predictions),
         eye=camera_model_for(evaluator.problem.setup).pose.translation,
         pivot=evaluator.problem.registration.robot_pivot,
-        grid=evaluator.problem.coarse_grid,
+        grid=default_mesh(Use.SCREEN, setup.geometry, setup.tool.radius, places),
         temperature=evaluator.state.temperature,
     )
 

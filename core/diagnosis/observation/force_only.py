@@ -24,6 +24,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.processes import at_once
 from palpate.foundation.progress import Report, silent
+from palpate.mesh.default_meshes import touched_places
 from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
 
@@ -161,16 +162,12 @@ def contact_places(data: Ordered[Observations], setup: Setup) -> FloatArray:
     Of places in sequences with clouds that are closer to one another than the tool's diameter, one
     is enough.
     """
-    kept = list(pushed_places(data, setup)[0])
+    places = pushed_places(data, setup)[0]
     for item in data:
         if not item.force_only:
             centres = item.centres(setup)
-            touching = setup.geometry.gap(centres, setup.tool.radius) < CLEARANCE
-            distance, normals = setup.geometry.facing(centres[touching])
-            for place in centres[touching] - distance[:, None] * normals:
-                if all(np.linalg.norm(place - other) > 2 * setup.tool.radius for other in kept):
-                    kept.append(place)
-    return np.array(kept).reshape(-1, 3)
+            places = touched_places(setup.geometry, setup.tool.radius, centres, list(places))
+    return places
 
 
 def deepest_rows(item: Observations) -> list[int]:

@@ -18,13 +18,15 @@ from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.foundation.figure import new_figure, save_figure
-from palpate.setup.block_surface import SIDES
-from palpate.setup.phantom_geometry import Surface
+from palpate.setup.phantom_geometry import PATCH, Surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["ErrorPatterns", "draw_patterns", "error_patterns", "patterns_figure"]
+
+_FOLD = 1e-3
+"""Gap between the top of the picture and its upright sides [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,13 +173,13 @@ def _kernel(surface: Surface) -> FloatArray:
     )
 
 
-def draw_patterns(patterns: ErrorPatterns, surface: Surface, path: Path) -> None:
+def draw_patterns(patterns: ErrorPatterns, path: Path) -> None:
     """Write the figure of both patterns as PNG."""
-    save_figure(patterns_figure(patterns, surface), path)
+    save_figure(patterns_figure(patterns), path)
 
 
-def patterns_figure(patterns: ErrorPatterns, surface: Surface) -> Figure:
-    """Draw both patterns, or the error alone if no cause is named, on the unfolded block.
+def patterns_figure(patterns: ErrorPatterns) -> Figure:
+    """Draw both patterns, or the error alone if no cause is named, on the unfolded surface.
 
     Both have one colour scale [mm].
     """
@@ -189,7 +191,7 @@ def patterns_figure(patterns: ErrorPatterns, surface: Surface) -> Figure:
     limit = max(1e3 * float(np.quantile(seen, 0.98)), 0.05) if len(seen) else 1.0
     for number, (title, values) in enumerate(shown):
         axes = figure.add_subplot(1, len(shown), number + 1)
-        drawn = _unfold(axes, patterns, values * 1e3, surface, limit)
+        drawn = _drawn(axes, patterns, values * 1e3, limit)
         axes.set_title(title)
         axes.set_aspect("equal")
         axes.axis("off")
@@ -202,19 +204,11 @@ def patterns_figure(patterns: ErrorPatterns, surface: Surface) -> Figure:
     return figure
 
 
-def _unfold(
-    axes: Any, patterns: ErrorPatterns, values: FloatArray, surface: Surface, limit: float
-) -> Any:
-    """Scatter the patches of the top and, folded out around it, those of the four sides."""
-    x, y, z = surface.geometry.size
-    centres, normals = patterns.centres, patterns.normals
-    place = centres[:, :2].copy()
-    for side in SIDES[1:]:
-        axis, sign = "xy".index(side[1]), 1.0 if side[0] == "+" else -1.0
-        here = normals[:, axis] == sign
-        place[here, axis] = sign * ((x, y)[axis] / 2 + 1e-3 + z - centres[here, 2])
+def _drawn(axes: Any, patterns: ErrorPatterns, values: FloatArray, limit: float) -> Any:
+    """Scatter the patches of the unfolded surface."""
+    place = _unfolded(patterns)
     seen = np.isfinite(values)
-    size = (surface.patch * 1e3 * 1.55) ** 2
+    size = (PATCH * 1e3 * 1.55) ** 2
     axes.scatter(*(1e3 * place[~seen]).T, s=size, c="0.93", marker="s", linewidths=0)
     return axes.scatter(
         *(1e3 * place[seen]).T,
@@ -226,3 +220,11 @@ def _unfold(
         marker="s",
         linewidths=0,
     )
+
+
+def _unfolded(patterns: ErrorPatterns) -> FloatArray:
+    """Places (p, 2) [m] of the patches from above, the upright ones folded outwards."""
+    centres, normals = patterns.centres, patterns.normals
+    below = centres[:, 2].max() - centres[:, 2] + _FOLD
+    level = np.linalg.norm(normals[:, :2], axis=1, keepdims=True)
+    return np.asarray(centres[:, :2] + normals[:, :2] * level * below[:, None])

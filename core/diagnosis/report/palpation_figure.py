@@ -13,7 +13,7 @@ from palpate.diagnosis.report.force_report import PushForces
 from palpate.diagnosis.report.inclusion_footprint import Footprint
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.figure import new_figure, save_figure
-from palpate.setup.setup import Box, Shape
+from palpate.setup.phantom_geometry import Geometry
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ INK, FAINT, FOUND = "#2b2f36", "#c9cdd3", "#0f766e"
 
 def draw_palpation(
     path: Path,
-    body: Box | Shape,
+    body: Geometry,
     pushes: PushForces,
     shown: Footprint | None,
     cause: dict[str, Any] | None,
@@ -54,7 +54,7 @@ def draw_palpation(
 
 def _from_above(
     axes: Axes,
-    body: Box | Shape,
+    body: Geometry,
     pushes: PushForces,
     shown: Footprint | None,
     cause: dict[str, Any] | None,
@@ -106,28 +106,23 @@ def _from_above(
     return drawn
 
 
-def _relief(axes: Axes, body: Box | Shape) -> None:
+def _relief(axes: Axes, body: Geometry) -> None:
     """Draw the phantom below the pushes: the rim of a block, or the height of an organ."""
-    if isinstance(body, Box):
+    if body.is_block:
         x, y = 500 * body.size[0], 500 * body.size[1]
         axes.fill([-x, x, x, -x], [-y, -y, y, y], color="#f1f2f4", ec=FAINT, lw=1.2, zorder=0)
         return
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.tri import Triangulation
 
-    up = body.facing(body.corners.mean(axis=1))[1][:, 2] > 0.05
+    vertices, triangles = body.closed_surface
+    up = body.facing(vertices[triangles].mean(axis=1))[1][:, 2] > 0.05
     shade = LinearSegmentedColormap.from_list("height", ["#dfe2e6", "#fbfbfc"])
-    x, y, z = 1e3 * body.vertices.T
-    axes.tripcolor(
-        Triangulation(x, y, body.triangles[up & ~body.held]),
-        z,
-        shading="gouraud",
-        cmap=shade,
-        zorder=0,
-    )
+    x, y, z = 1e3 * vertices.T
+    axes.tripcolor(Triangulation(x, y, triangles[up]), z, shading="gouraud", cmap=shade, zorder=0)
 
 
-def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
+def _cut(axes: Axes, body: Geometry, cause: dict[str, Any]) -> None:
     """Draw a section through the inclusion's centre: the phantom, the inclusion, and its depth.
 
     The section lies along x or y, whichever the nearest surface is more inclined to.
@@ -169,7 +164,7 @@ def _cut(axes: Axes, body: Box | Shape, cause: dict[str, Any]) -> None:
     _plain(axes)
 
 
-def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
+def section(body: Geometry, axis: int, at: float) -> FloatArray:
     """Cut the surface by the plane x or y = `at` [m].
 
     Args:
@@ -180,12 +175,9 @@ def section(body: Box | Shape, axis: int, at: float) -> FloatArray:
     Returns segments (k, 2, 2) [m]: the other one of x and y, and z.
     """
     axes = [1 - axis, 2]
-    if isinstance(body, Box):
-        side, height = body.size[1 - axis] / 2, body.size[2]
-        corners = np.array([[-side, 0.0], [side, 0.0], [side, height], [-side, height]])
-        return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    vertices, triangles = body.closed_surface
     segments = []
-    for corners in body.corners:
+    for corners in vertices[triangles]:
         away, ends = corners[:, axis] - at, []
         for a, b in ((0, 1), (1, 2), (2, 0)):
             if (away[a] < 0) != (away[b] < 0):

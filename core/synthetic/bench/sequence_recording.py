@@ -17,7 +17,7 @@ from palpate.synthetic.bench.formed_surface import FormedSurface
 from palpate.synthetic.bench.motion_plan import MotionPlan
 from palpate.synthetic.bench.solved_track import SolvedTrack
 from palpate.synthetic.bench.true_body import true_offset, true_radius
-from palpate.synthetic.bench.virtual_experiment import neutral_displacement, solve_motion
+from palpate.synthetic.bench.virtual_experiment import Mesher, neutral_displacement, solve_motion
 from palpate.synthetic.bench.visibility import mean_square_change, visible_weights
 from palpate.synthetic.dataset_writer import write_clouds, write_forces, write_kinematics, write_ply
 from palpate.synthetic.laws.sensor_laws import camera_motion, clock_offset
@@ -51,6 +51,8 @@ class SequenceJob:
         seed: of everything random.
         begun: offset of the base from its place (x, y) [m] at the beginning.
         session: time from `rest.ply` to the beginning [s].
+        body: meshes the body; a block without it. The changes by hidden effects are measured on
+            blocks only.
     """
 
     scenario: Scenario
@@ -63,6 +65,7 @@ class SequenceJob:
     seed: int
     begun: tuple[float, float] = (0.0, 0.0)
     session: float = 0.0
+    body: Mesher | None = None
 
 
 @dataclass(frozen=True)
@@ -87,10 +90,11 @@ class SequenceRecord:
 def record_motion(job: SequenceJob) -> SequenceRecord:
     """Solve one sequence and write its kinematics, forces and clouds."""
     planned = job.motion
-    track = solve_motion(job.scenario, planned, begun=job.begun)
+    track = solve_motion(job.scenario, planned, body=job.body, begun=job.begun)
     job = replace(job, motion=track.motion)
+    pressed = 1 if job.body is None else -1
     shortened = [
-        float(before.corners[1] - after.corners[1])
+        float(before.corners[pressed] - after.corners[pressed])
         for before, after in zip(planned.pushes, track.motion.pushes, strict=True)
     ]
     rng = np.random.default_rng([job.seed, 2, *job.motion.name.encode()])
@@ -224,7 +228,7 @@ def _visibility(job: SequenceJob, track: SolvedTrack) -> list[float]:
 
     Errors of touches and depth are not included.
     """
-    if not job.scenario.effects:
+    if not job.scenario.effects or job.body is not None:
         return []
     hidden = job.scenario.hidden("time_offset")
     late = hidden.value("offset") if hidden else 0.0

@@ -20,13 +20,16 @@ from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_block import IntArray, TetBlock, TetGrading, mesh_block
 from palpate.synthetic.solver.tet_equilibrium import InstabilityError
 
-__all__ = ["neutral_displacement", "rest_surface", "solve_motion"]
+__all__ = ["Mesher", "neutral_displacement", "rest_surface", "solve_motion"]
 
+_AT_REST = 8e-3
+"""Edge of the elements of an untouched body [m]."""
 SHORTER, MOST_SHORT = 1.0e-3, 4.5e-3
 """Step by which a push into an unstable block is shortened, and the limit of it [m]."""
 
-Mesher = Callable[[Scenario, PlannedPush, float], TetBlock]
-"""Meshes the body for one push of a scenario, with edges of the given length [m] at the contact."""
+Mesher = Callable[[Scenario, Sequence[PlannedPush], float], TetBlock]
+"""Meshes the body for some pushes of a scenario, with edges of the given length [m] at their
+contacts."""
 
 
 def solve_motion(
@@ -46,16 +49,16 @@ def solve_motion(
         scenario: what is believed and hidden.
         motion: as planned.
         fine: longest element edge at the contact [m]; that of the scenario without it.
-        body: meshes the body; a block without it, and always with a history.
+        body: meshes the body; a block without it.
         begun: slip of the base before (x, y) [m].
     """
-    fine = fine or scenario.fine
+    fine, body = fine or scenario.fine, body or _block
     ends = [*(float(push.times[0]) for push in motion.pushes[1:]), motion.duration]
     slip = np.array([*begun, 0.0])
     if scenario.has_history:
-        solved_pushes = _solve_on_one_mesh(scenario, motion.pushes, ends, fine, slip)
+        solved_pushes = _solve_on_one_mesh(scenario, motion.pushes, ends, fine, body, slip)
     else:
-        solved_pushes = _solve_separately(scenario, motion, ends, fine, body or _block, slip)
+        solved_pushes = _solve_separately(scenario, motion, ends, fine, body, slip)
     return SolvedTrack(
         replace(motion, pushes=tuple(solved.push for solved in solved_pushes)), tuple(solved_pushes)
     )
@@ -93,7 +96,7 @@ def _solve_push(
     """
     for short in np.arange(0.0, MOST_SHORT, SHORTER):
         tried = push.shallower(float(short))
-        block = body(scenario, tried, fine)
+        block = body(scenario, (tried,), fine)
         specimen = Specimen(scenario, block, slip, axis)
         try:
             creep = specimen.creep
@@ -119,10 +122,11 @@ def _solve_on_one_mesh(
     pushes: Sequence[PlannedPush],
     ends: Sequence[float],
     fine: float,
+    body: Mesher,
     slip: FloatArray,
 ) -> list[SolvedPush]:
     """Solve all pushes on one mesh, which carries the material's history."""
-    block = mesh_block(scenario.true_size, _grading(scenario, pushes, fine))
+    block = body(scenario, pushes, fine)
     specimen, solved_pushes = Specimen(scenario, block, slip), []
     try:
         for push, end in zip(pushes, ends, strict=True):
@@ -176,23 +180,32 @@ def neutral_displacement(scenario: Scenario, solved: SolvedPush, centre: FloatAr
         specimen.close()
 
 
-def rest_surface(scenario: Scenario) -> tuple[FloatArray, FloatArray, IntArray]:
-    """The untouched block.
+def rest_surface(
+    scenario: Scenario, body: Mesher | None = None
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """The untouched body.
+
+    Args:
+        scenario: what is believed and hidden.
+        body: meshes the body; a block without it.
 
     Returns:
         drawn surface of the true shape (s, 3) [m], its displacement (s, 3) [m], triangles (t, 3).
     """
-    grading = TetGrading(
-        np.zeros((1, 3)), np.zeros(1), np.full(1, 8e-3), 8e-3, 0.5, material_levels(scenario)
-    )
-    block = mesh_block(scenario.true_size, grading)
+    block = (body or _resting_block)(scenario, (), _AT_REST)
     specimen = Specimen(scenario, block, np.zeros(3))
     specimen.close()
     return block.surface_rest, specimen.settled, block.surface_faces
 
 
-def _block(scenario: Scenario, push: PlannedPush, fine: float) -> TetBlock:
-    return mesh_block(scenario.true_size, _grading(scenario, (push,), fine))
+def _resting_block(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetBlock:
+    levels = material_levels(scenario)
+    grading = TetGrading(np.zeros((1, 3)), np.zeros(1), np.full(1, fine), fine, 0.5, levels)
+    return mesh_block(scenario.true_size, grading)
+
+
+def _block(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetBlock:
+    return mesh_block(scenario.true_size, _grading(scenario, pushes, fine))
 
 
 def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:

@@ -18,7 +18,7 @@ from palpate.foundation.errors import DatasetError
 from palpate.foundation.frames import Transform
 from palpate.registration.registration import register, setup_from
 from palpate.setup.setup import Shape
-from palpate.synthetic.bench.organ_shape import organ_surface, write_surface
+from palpate.synthetic.bodies.organ_shape import organ_surface, write_surface
 
 SIZE = (0.06, 0.04, 0.03)
 

@@ -21,7 +21,7 @@ from palpate.registration.rest_fit import refine_rest_cloud
 from palpate.registration.shape.seen_body import SeenBody
 from palpate.setup.free_form.shape import Shape
 from palpate.setup.setup import Sensor, Setup, Tool
-from palpate.synthetic.bench.shape_families import draw_shape
+from palpate.synthetic.bodies.shape_families import draw_shape
 
 PLACE = np.array([0.024, 0.008])
 """Place of the push beside the middle [m]."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.setup.box import Box
-from palpate.synthetic.bench.shape_families import draw_shape
+from palpate.synthetic.bodies.shape_families import draw_shape
 
 
 def test_distances_to_a_free_form_are_interpolated_to_a_fifth_of_a_millimetre() -> None:

@@ -13,7 +13,7 @@ from palpate.dataset import open_dataset
 from palpate.registration.registration import register, setup_from
 from palpate.setup.setup import Shape
 from palpate.synthetic import draw_palpation, make_palpation, truth_path
-from palpate.synthetic.bench.organ_shape import organ_surface
+from palpate.synthetic.bodies.organ_shape import organ_surface
 from palpate.synthetic.make_palpation import _motions
 
 SPLITS = {"train": 1, "validation": 0, "test": 0}

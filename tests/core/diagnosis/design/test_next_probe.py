@@ -40,7 +40,7 @@ LUMP = Survivor(
     StiffInclusion(x=0.02, y=0.0, z=0.026, radius=7e-3, stiffness_ratio=8.0).apply(SETUP)
 )
 LATE = Survivor(TimeOffset(offset=0.1).apply(SETUP))
-DEEP = Push(kind="top", side="top", place=(0.02, 0.0, TOP), depth=5e-3)
+DEEP = Push(kind="top", side="top", into=(0.0, 0.0, -1.0), place=(0.02, 0.0, TOP), depth=5e-3)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from palpate.effects.sensor import CameraRegistration, TimeOffset
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DiagnosisError
 from palpate.setup.setup import Box, Setup, Shape, Tool
-from palpate.synthetic.bench.organ_shape import organ_surface
+from palpate.synthetic.bodies.organ_shape import organ_surface
 
 SIZE = (0.06, 0.04, 0.03)
 SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))

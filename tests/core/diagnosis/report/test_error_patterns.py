@@ -88,7 +88,7 @@ def test_patterns_are_drawn_as_png(evaluator, tmp_path: Path):
         _pictured(evaluator, gap, count),
         _pictured(evaluator, 0.2 * gap, count),
     )
-    draw_patterns(found, evaluator.problem.surface, tmp_path / "patterns.png")
+    draw_patterns(found, tmp_path / "patterns.png")
     assert (tmp_path / "patterns.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "patterns.png").stat().st_size > 10_000
 
@@ -107,6 +107,6 @@ def test_without_a_cause_the_largest_error_is_drawn_alone(evaluator, tmp_path):
     )
     widths = []
     for number, one in enumerate((unnamed, named)):
-        draw_patterns(one, evaluator.problem.surface, tmp_path / f"{number}.png")
+        draw_patterns(one, tmp_path / f"{number}.png")
         widths.append(imread(tmp_path / f"{number}.png").shape[1])
     assert widths[0] < 0.65 * widths[1]

@@ -28,7 +28,7 @@ from palpate.foundation.errors import DiagnosisError
 from palpate.mesh.graded_mesh import Grading
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Box, Inclusion, Material, Setup, Shape, Tool
-from palpate.synthetic.bench.organ_shape import organ_surface
+from palpate.synthetic.bodies.organ_shape import organ_surface
 
 SIZE = (0.06, 0.04, 0.03)
 LUMP = Inclusion(x=0.006, y=-0.003, z=0.0185, radius=7e-3, stiffness_ratio=6.0)

@@ -11,7 +11,7 @@ from palpate.foundation.frames import Transform
 from palpate.registration.pose import motion_jacobian, small_motion
 from palpate.registration.shape.ray_fit import BODY, TABLE, on_surface, refined
 from palpate.registration.shape.seen_body import SeenBody
-from palpate.synthetic.bench.shape_families import draw_shape
+from palpate.synthetic.bodies.shape_families import draw_shape
 
 SHAPE = SeenBody(draw_shape("kidney", 0))
 

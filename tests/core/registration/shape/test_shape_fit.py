@@ -11,7 +11,7 @@ from palpate.foundation.frames import Transform
 from palpate.registration.camera.camera_fit import CameraFit
 from palpate.registration.shape.seen_body import SeenBody
 from palpate.registration.shape.shape_fit import fit_shape_camera, refine_shape_camera
-from palpate.synthetic.bench.shape_families import draw_shape
+from palpate.synthetic.bodies.shape_families import draw_shape
 
 LIVER = draw_shape("liver", 0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.setup.setup import Shape
-from palpate.synthetic.bench.organ_shape import (
+from palpate.synthetic.bodies.organ_shape import (
     organ_block,
     organ_normals,
     organ_places,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.synthetic.bench.shape_families import FAMILIES, draw_shape
+from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -1,0 +1,219 @@
+"""Virtual datasets of a free form under a depth camera: its surface, clouds, forces, and the truth.
+
+The body is drawn from a family of shapes, pushed along its normals where the camera sees it, and
+solved by the virtual bench's own solver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import EffectError
+from palpate.foundation.frames import Transform
+from palpate.foundation.progress import Report, silent
+from palpate.setup.free_form.shape import Shape
+from palpate.synthetic.atomic_write import write_atomically
+from palpate.synthetic.bench.depth_camera import CameraScene, DepthCamera
+from palpate.synthetic.bench.motion_plan import MotionPlan
+from palpate.synthetic.bench.sequence_recording import SequenceJob
+from palpate.synthetic.bench.virtual_experiment import rest_surface
+from palpate.synthetic.bodies.organ_shape import write_surface
+from palpate.synthetic.bodies.shape_families import draw_shape
+from palpate.synthetic.bodies.shape_mesher import ShapeMesher
+from palpate.synthetic.bodies.shape_pushes import push_motion, reachable_places, spread_places
+from palpate.synthetic.dataset_writer import write_config, write_ply, write_touches
+from palpate.synthetic.make_dataset import TOUCH_NOISE, draw_camera, draw_camera_shift, record_all
+from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.scenario import Scenario
+from palpate.synthetic.scenario.scenario_draws import draw_scenario
+from palpate.synthetic.scenario.truth_file import Truth
+
+__all__ = ["ON_SHAPES", "ShapeScenario", "draw_shape_scenario", "make_shape_dataset"]
+
+ON_SHAPES = (
+    "poisson_ratio",
+    "stiff_inclusion",
+    "tool_radius",
+    "tool_offset",
+    "gravity",
+    "time_offset",
+    "camera_registration",
+    "stiffness_gradient",
+    "strain_stiffening",
+    "base_compliance",
+    "tool_compliance",
+    "depth_bias",
+    "geometry_scale",
+)
+"""Effects that the bench can hide in a free form."""
+_SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
+_PUSHES = 2
+"""Pushes of a sequence."""
+_MARKS = 6
+"""Landmarks on the surface."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShapeScenario:
+    """A free form, and what is believed and hidden of it.
+
+    Attributes:
+        family: of the shape.
+        seed: of its proportions.
+        scenario: beliefs and hidden effects; its size is the shape's.
+    """
+
+    family: str
+    seed: int
+    scenario: Scenario
+
+    @cached_property
+    def stated(self) -> Shape:
+        """The body as its file states it."""
+        return draw_shape(self.family, self.seed)
+
+    @cached_property
+    def true(self) -> Shape:
+        """The body on the bench."""
+        factors = np.array(self.scenario.true_size) / np.array(self.scenario.size)
+        return self.stated.scaled(factors)
+
+
+def draw_shape_scenario(
+    family: str, effects: int, seed: int, among: tuple[str, ...] = ON_SHAPES
+) -> ShapeScenario:
+    """Draw a free form with clear hidden effects; EffectError for one that no shape can have.
+
+    Args:
+        family: of the shape.
+        effects: number of different hidden effects.
+        seed: of everything random.
+        among: effects to draw from.
+    """
+    if unknown := [name for name in among if name not in ON_SHAPES]:
+        raise EffectError(
+            f"the virtual bench cannot hide {unknown[0]!r} in a shape; "
+            f"it knows {', '.join(ON_SHAPES)}",
+            effect=unknown[0],
+        )
+    shape, rng = draw_shape(family, seed), np.random.default_rng([seed, 41])
+    drawn = draw_scenario(seed, effects, among=among).effects
+    hidden = tuple(_lump(shape, rng) if one.effect == "stiff_inclusion" else one for one in drawn)
+    mass = round(1000.0 * shape.volume, 5)
+    scenario = Scenario(effects=hidden, sequences=_SEQUENCES, size=shape.size, mass=mass)
+    return ShapeScenario(family=family, seed=seed, scenario=scenario)
+
+
+def _lump(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
+    """Draw a stiff ball close under the upper part of the surface."""
+    radius = float(rng.uniform(6.5e-3, 8.5e-3))
+    above = _above(shape)
+    places, normals = reachable_places(shape, "poke-top", above, radius)
+    row = int(rng.integers(len(places)))
+    centre = places[row] - normals[row] * (radius + rng.uniform(2e-3, 3.5e-3))
+    values = {name: round(float(value), 5) for name, value in zip("xyz", centre, strict=True)}
+    ratio = round(float(rng.uniform(4.0, 8.0)), 2)
+    return HiddenEffect(
+        "stiff_inclusion", {**values, "radius": round(radius, 5), "stiffness_ratio": ratio}
+    )
+
+
+def make_shape_dataset(
+    folder: Path, drawn: ShapeScenario, seed: int, workers: int = 1, report: Report = silent
+) -> Truth:
+    """Make the dataset `folder` and its truth beside it, both whole or neither.
+
+    Raises RunError where `folder` exists.
+    """
+    truth = write_atomically(folder, lambda aside: _fill(aside, drawn, seed, workers, report))
+    report(1.0, f"made {folder.name}")
+    return truth
+
+
+def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: Report) -> Truth:
+    rng, scenario, body = np.random.default_rng([seed, 1]), drawn.scenario, ShapeMesher(drawn.true)
+    seen = rng.choice([-1.0, 1.0], size=2)
+    robot_from_phantom = Transform(
+        Rotation.random(rng=rng).as_matrix(), rng.uniform(-0.25, 0.25, 3)
+    )
+    report(0.0, "letting the body settle")
+    rest, settled, faces = rest_surface(scenario, body)
+    camera = draw_camera(scenario, (rest + settled, faces), seen, rng)
+    scene = CameraScene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0)
+    shift = draw_camera_shift(scenario, rng)
+    write_ply(folder / "rest.ply", camera.cloud(scene, rng))
+    write_surface(folder / "phantom.stl", drawn.stated.vertices, drawn.stated.triangles)
+    marks = _marks(drawn.stated)
+    _write_touches(folder, drawn, marks, robot_from_phantom, (rest, settled), rng)
+    name = f"{drawn.family}-{rng.integers(16**4):04x}"
+    write_config(folder / "dataset.toml", name, scenario, marks, None, "phantom.stl")
+    jobs = [
+        SequenceJob(
+            scenario,
+            motion,
+            camera,
+            robot_from_phantom,
+            shift,
+            seen,
+            folder / "sequences" / motion.name,
+            seed,
+            body=body,
+        )
+        for motion in _motions(drawn, camera, seed)
+    ]
+    return record_all(jobs, workers, report)
+
+
+def _marks(shape: Shape) -> dict[str, FloatArray]:
+    """Landmarks (3,) [m] by name, spread over the upper part of the surface."""
+    places, _ = reachable_places(shape, "poke-top", _above(shape), 5e-3)
+    sides, _ = reachable_places(shape, "poke-side", _above(shape), 5e-3)
+    every = np.concatenate([places, sides])
+    chosen = every[spread_places(every, _MARKS)]
+    return {f"mark_{number}": np.round(place, 5) for number, place in enumerate(chosen, start=1)}
+
+
+def _write_touches(
+    folder: Path,
+    drawn: ShapeScenario,
+    marks: dict[str, FloatArray],
+    robot_from_phantom: Transform,
+    surface: tuple[FloatArray, FloatArray],
+    rng: np.random.Generator,
+) -> None:
+    """Write touches of the marks on the true body, with the error of a careful hand."""
+    scenario, (rest, settled) = drawn.scenario, surface
+    factors = np.array(scenario.true_size) / np.array(scenario.size)
+    places = np.array(list(marks.values())) * factors
+    near = [int(np.linalg.norm(rest - place, axis=1).argmin()) for place in places]
+    touched = places + settled[near] + (0.0, 0.0, scenario.touch_offset)
+    touched = touched + rng.normal(size=touched.shape) * TOUCH_NOISE
+    write_touches(folder / "touches.csv", list(marks), robot_from_phantom.apply(touched))
+
+
+def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[MotionPlan]:
+    """Plan the sequences, each with places of its own."""
+    shape, radius = drawn.true, drawn.scenario.tool_radius
+    eye, found = camera.phantom_from_camera.translation, []
+    names = drawn.scenario.sequences
+    for kind in dict.fromkeys(name.rpartition("-")[0] for name in names):
+        own = [name for name in names if name.startswith(kind)]
+        rng = np.random.default_rng([seed, 33, *kind.encode()])
+        places, normals = reachable_places(shape, kind, eye, radius)
+        mixed = rng.permutation(len(places))
+        chosen = mixed[spread_places(places[mixed], _PUSHES * len(own))]
+        for number, name in enumerate(own):
+            rows = chosen[number :: len(own)]
+            found.append(push_motion(name, shape, places[rows], normals[rows], radius, rng))
+    return sorted(found, key=lambda one: names.index(one.name))
+
+
+def _above(shape: Shape) -> FloatArray:
+    """A point (3,) [m] far above the body."""
+    return np.array([*(0.5 * (shape.low + shape.high))[:2], shape.height + 1.0])
