@@ -36,6 +36,13 @@ def demo(
             "or with --effects 0."
         ),
     ] = None,
+    shape: Annotated[
+        str | None,
+        typer.Option(
+            help="A phantom of another shape than a block: dome, liver, kidney, breast, cylinder "
+            "or grooved."
+        ),
+    ] = None,
     show: Annotated[
         bool, typer.Option("--serve/--no-serve", help="Open the page afterwards.")
     ] = True,
@@ -50,11 +57,17 @@ def demo(
         raise typer.BadParameter(f"--palpation is box or organ, not {palpation!r}")
     if palpation and effects > 1:
         raise typer.BadParameter("--palpation hides one lump at most: --effects 0 or 1")
+    if shape and palpation:
+        raise typer.BadParameter("--shape has a camera and --palpation has none: give one")
     chosen = secrets.randbelow(1_000_000) if seed is None else seed
-    again = f"palpate demo --seed {chosen}" + (f" --palpation {palpation}" if palpation else "")
+    again = (
+        f"palpate demo --seed {chosen}"
+        + (f" --palpation {palpation}" if palpation else "")
+        + (f" --shape {shape}" if shape else "")
+    )
     out.print(f"seed [bold]{chosen}[/]  (the same again: {again})", highlight=False)
-    dataset = folder / "datasets" / f"{palpation or 'demo'}-{chosen}-{effects}"
-    truth = _make(dataset, chosen, effects, workers, palpation)
+    dataset = folder / "datasets" / f"{palpation or shape or 'demo'}-{chosen}-{effects}"
+    truth = _make(dataset, chosen, effects, workers, palpation, shape)
     run = folder / "runs" / f"{dataset.name}-{time.strftime('%Y%m%d-%H%M%S')}"
     report, seconds = run_diagnosis(dataset, run, workers, chosen)
     print_report(report)
@@ -79,7 +92,7 @@ def demo(
 
 
 def _make(
-    dataset: Path, seed: int, effects: int, workers: int, palpation: str | None
+    dataset: Path, seed: int, effects: int, workers: int, palpation: str | None, shape: str | None
 ) -> dict[str, Any]:
     """Make the dataset of this seed and return its truth; an existing one is used again."""
     from palpate.app.commands.diagnosis import truth_beside
@@ -87,8 +100,10 @@ def _make(
         SHORT_PROTOCOL,
         draw_palpation,
         draw_scenario,
+        draw_shape_scenario,
         make_dataset,
         make_palpation,
+        make_shape_dataset,
     )
 
     known = truth_beside(dataset) if dataset.is_dir() else None
@@ -100,5 +115,8 @@ def _make(
             return make_palpation(
                 dataset, draw_palpation(body, effects, seed), seed, workers, report
             ).as_dict()
+        if shape:
+            drawn = draw_shape_scenario(shape, effects, seed)
+            return make_shape_dataset(dataset, drawn, seed, workers, report).as_dict()
         scenario = replace(draw_scenario(seed, effects), sequences=SHORT_PROTOCOL)
         return make_dataset(dataset, scenario, seed, workers, report).as_dict()

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from palpate.foundation.arrays import FloatArray
-from palpate.foundation.errors import EffectError
+from palpate.foundation.errors import EffectError, SetupError
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
 from palpate.setup.free_form.shape import Shape
@@ -24,7 +24,7 @@ from palpate.synthetic.bench.motion_plan import MotionPlan
 from palpate.synthetic.bench.sequence_recording import SequenceJob
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.bodies.organ_shape import write_surface
-from palpate.synthetic.bodies.shape_families import draw_shape
+from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
 from palpate.synthetic.bodies.shape_pushes import push_motion, reachable_places, spread_places
 from palpate.synthetic.dataset_writer import write_config, write_ply, write_touches
@@ -88,7 +88,9 @@ class ShapeScenario:
 def draw_shape_scenario(
     family: str, effects: int, seed: int, among: tuple[str, ...] = ON_SHAPES
 ) -> ShapeScenario:
-    """Draw a free form with clear hidden effects; EffectError for one that no shape can have.
+    """Draw a free form with clear hidden effects.
+
+    Raises SetupError for an unknown family, EffectError for an effect that no shape can have.
 
     Args:
         family: of the shape.
@@ -96,6 +98,10 @@ def draw_shape_scenario(
         seed: of everything random.
         among: effects to draw from.
     """
+    if family not in FAMILIES:
+        raise SetupError(
+            f"there is no shape {family!r}; there are {', '.join(FAMILIES)}", key="family"
+        )
     if unknown := [name for name in among if name not in ON_SHAPES]:
         raise EffectError(
             f"the virtual bench cannot hide {unknown[0]!r} in a shape; "

@@ -40,7 +40,7 @@ class StretchedSurface(Surface):
     @cached_property
     def _factors(self) -> FloatArray:
         """True over stated lengths (3,) [1]."""
-        return np.array(self.geometry.size) / np.array(self.stated.geometry.size)
+        return np.asarray(np.array(self.geometry.size) / np.array(self.stated.geometry.size))
 
     def own(self, places: FloatArray) -> FloatArray:
         """Rest positions (m, 3) [m] in this body of rest positions in the stated one."""
