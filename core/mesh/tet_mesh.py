@@ -20,6 +20,8 @@ _SIDES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 """Corners of a tetrahedron's sides, counter-clockwise from outside."""
 _QUARTERS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
 """The four triangles between the six nodes of a side."""
+_REMEMBERED = 6
+"""Sets of points whose places in a mesh are cached."""
 _GRIDDED = 2.5e-3
 """Largest spacing of the grid on which a picture of the inside is drawn [m]."""
 _ON_THE_EDGE = 1e-9
@@ -168,8 +170,25 @@ class TetMesh:
         return self.connectivity.elements[element], gradients
 
     def _shares_of(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Tetrahedra (m,) and barycentric coordinates (m, 4) of points (m, 3) [m]."""
+        """Tetrahedra (m,) and barycentric coordinates (m, 4) of points (m, 3) [m].
+
+        The last few sets of points are cached: those of a surface are asked for in every frame.
+        """
         places = np.array(points, dtype=float)
+        key = places.tobytes()
+        if key not in self._located:
+            if len(self._located) >= _REMEMBERED:
+                self._located.pop(next(iter(self._located)))
+            self._located[key] = self._found(places)
+        return self._located[key]
+
+    @cached_property
+    def _located(self) -> dict[bytes, tuple[IntArray, FloatArray]]:
+        """Results of `_shares_of` by the bytes of the points."""
+        return {}
+
+    def _found(self, places: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Search for `_shares_of`; moves places outside to the surface."""
         element = containing(places, *self._frames, _ON_THE_EDGE)
         outside = np.flatnonzero(element < 0)
         if len(outside):

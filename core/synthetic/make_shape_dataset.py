@@ -1,7 +1,7 @@
 """Virtual datasets of a free form under a depth camera: its surface, clouds, forces, and the truth.
 
 The body is drawn from a family of shapes, pushed along its normals where the camera sees it, and
-solved by the virtual bench's own solver.
+solved by the virtual bench's own solver. One push of each sequence is over a hidden lump.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import EffectError, SetupError
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
@@ -55,6 +55,8 @@ ON_SHAPES = (
 _SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
 _PUSHES = 2
 """Pushes of a sequence."""
+_FELT = 6e-3
+"""Distance of a lump from a pushed place within which it is felt [m]."""
 _MARKS = 6
 """Landmarks on the surface."""
 
@@ -214,10 +216,23 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
         places, normals = reachable_places(shape, kind, eye, radius)
         mixed = rng.permutation(len(places))
         chosen = mixed[spread_places(places[mixed], _PUSHES * len(own))]
+        over = _over_lump(drawn, places)
         for number, name in enumerate(own):
             rows = chosen[number :: len(own)]
+            if len(over):
+                rows = np.append(rows[1:], rng.choice(over))
             found.append(push_motion(name, shape, places[rows], normals[rows], radius, rng))
     return sorted(found, key=lambda one: names.index(one.name))
+
+
+def _over_lump(drawn: ShapeScenario, places: FloatArray) -> IntArray:
+    """Rows of places (n, 3) [m] from which a hidden lump can be felt; none without a lump."""
+    lump = drawn.scenario.hidden("stiff_inclusion")
+    if lump is None:
+        return np.zeros(0, dtype=np.int64)
+    centre = np.array([lump.value(axis) for axis in "xyz"])
+    depth = np.linalg.norm(places - centre, axis=1) - lump.value("radius")
+    return np.flatnonzero(depth < _FELT)
 
 
 def _above(shape: Shape) -> FloatArray:
