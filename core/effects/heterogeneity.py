@@ -25,14 +25,16 @@ correlation of 0.99 with replays of J_m 1 and 3."""
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceLayer(Effect):
-    """A skin of other stiffness on the top, such as a coating or a capsule."""
+    """A skin of other stiffness, such as a coating or a capsule.
+
+    It lies on the top of a block, and on the free surface of any other body.
+    """
 
     name, enters = "surface_layer", Slot.MATERIAL
     family = STIFFNESS
-    summary = "a skin of other stiffness lies on the top"
+    summary = "a skin of other stiffness lies on the surface"
     linearisation, amplitude = Linearisation.TANGENT, "stiffness_ratio"
     shown_by = frozenset({Measurement.CLOUDS, Measurement.FORCES})
-    needs_box = True
     thickness: float = parameter("m", low=3e-4, high=2e-2, scale=5e-4, accuracy=3e-4)
     stiffness_ratio: float = parameter("1", low=0.02, high=50.0, scale=0.5, log=True, accuracy=0.15)
 

@@ -108,15 +108,15 @@ class BlockModel:
         """
         self.mesh, self.setup = mesh, setup
         self.topology = topology(mesh.connectivity, held=not base_can_move(setup.support))
-        element, height = self.topology.element, setup.geometry.height
+        element = self.topology.element
         self.law, self.dense = Law.of(setup.material), dense
         self.face, self._base_face = element.dense_face if dense else element.face, element.face
         self.rule, surface = element_quadrature(mesh), surface_quadrature(mesh, self.face)
-        self.areas = surface.edges**2 * surface_stiffness(setup.material, surface, height)
+        self.areas = surface.edges**2 * surface_stiffness(setup.material, surface, setup.geometry)
         self.hardness = 1.0
         self._all_areas = self.areas
         mu, bulk = lame(self.law, setup.material.poisson_ratio)
-        factor = np.exp(log_stiffness(setup.material, self.rule, height))
+        factor = np.exp(log_stiffness(setup.material, self.rule, setup.geometry))
         self.mu, self.bulk = mu * factor, bulk * factor
         self.unrelaxed = self.mu
         # Rounding error of the energy: sums of squares near three lose their last digits when three

@@ -92,6 +92,10 @@ class Box(Geometry):
             lengths(np.maximum(beyond, 0.0)) + np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
         )
 
+    def below_skin(self, points: FloatArray) -> FloatArray:
+        """Depth (m,) [m] below the top, see `Geometry.below_skin`."""
+        return np.asarray(self.size[2] - points[:, 2])
+
     @property
     def closed_surface(self) -> tuple[FloatArray, IntArray]:
         """The eight corners [m] and twelve triangles, see `Geometry.closed_surface`."""

@@ -84,6 +84,12 @@ class Geometry(ABC):
         positive outside; of a free form interpolated, to about 0.2 mm.
         """
 
+    @abstractmethod
+    def below_skin(self, points: FloatArray) -> FloatArray:
+        """Depth (m,) [m] of points (m, 3) [m] of the body below the surface on which a skin lies:
+        the flat top of a block, the free surface of a free form.
+        """
+
     @property
     @abstractmethod
     def closed_surface(self) -> tuple[FloatArray, IntArray]:

@@ -193,13 +193,7 @@ class Setup:
             self._check_shape(self.geometry)
 
     def _check_shape(self, shape: Shape) -> None:
-        """Refuse properties of a block's flat sides for a body that lacks them."""
-        if self.material.layer is not None:
-            raise SetupError(
-                f"{shape.name}: a layer lies on the flat top of a block; "
-                "leave it out for other shapes",
-                key="layer",
-            )
+        """Refuse a detached part of a base that is not flat."""
         if self.support.detached and not shape.flat_base:
             heights = shape.corners[shape.held][..., 2]
             raise SetupError(

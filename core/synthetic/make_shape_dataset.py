@@ -44,6 +44,7 @@ ON_SHAPES = (
     "gravity",
     "time_offset",
     "camera_registration",
+    "surface_layer",
     "stiffness_gradient",
     "strain_stiffening",
     "base_compliance",

@@ -1,4 +1,4 @@
-"""Stiffness from place to place: inclusions, a skin on top, and a gradient through the height."""
+"""Stiffness from place to place: inclusions, a skin, and a gradient through the height."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from palpate.foundation.arrays import FloatArray
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Inclusion, Layer, Material
 
 __all__ = [
@@ -80,11 +81,11 @@ def _in_ball(places: Any, edges: Any, x: float, y: float, z: float, radius: floa
 
 
 @njit(cache=True)
-def _above(heights: Any, edges: Any, least: float) -> Any:
-    """Share (m,) of the volume of points at these heights (m,) above `least` [m]."""
-    result = np.empty(len(heights))
-    for m in range(len(heights)):
-        result[m] = _inside(heights[m] - least, edges[m])
+def _within(depths: Any, edges: Any, most: float) -> Any:
+    """Share (m,) of the volume of points at these depths (m,) above `most` [m]."""
+    result = np.empty(len(depths))
+    for m in range(len(depths)):
+        result[m] = _inside(most - depths[m], edges[m])
     return result
 
 
@@ -97,30 +98,27 @@ def lump_share(lump: Inclusion, points: SamplePoints) -> FloatArray:
     return np.asarray(share.reshape(edges.shape))
 
 
-def layer_share(layer: Layer, points: SamplePoints, height: float) -> FloatArray:
-    """Share (...) of each point's volume within the skin on top of a body of this height
-    [m] [1].
-    """
+def layer_share(layer: Layer, points: SamplePoints, geometry: Geometry) -> FloatArray:
+    """Share (...) of each point's volume within the skin of a body [1]."""
     edges = points.edges
-    share = _above(
-        np.ascontiguousarray(points.places[..., 2]).ravel(), edges.ravel(), height - layer.thickness
-    )
+    depths = geometry.below_skin(points.places.reshape(-1, 3))
+    share = _within(np.ascontiguousarray(depths), edges.ravel(), layer.thickness)
     return np.asarray(share.reshape(edges.shape))
 
 
-def log_stiffness(material: Material, points: SamplePoints, height: float) -> FloatArray:
+def log_stiffness(material: Material, points: SamplePoints, geometry: Geometry) -> FloatArray:
     """Logarithm (...) of the stiffness at these points over the stated one [1]."""
-    log_factor = material.log_ratio * (points.places[..., 2] / height - 0.5)
+    log_factor = material.log_ratio * (points.places[..., 2] / geometry.height - 0.5)
     for lump in material.inclusions:
         log_factor += lump_share(lump, points) * np.log(lump.stiffness_ratio)
     if material.layer is not None:
-        log_factor += layer_share(material.layer, points, height) * np.log(
+        log_factor += layer_share(material.layer, points, geometry) * np.log(
             material.layer.stiffness_ratio
         )
     return np.asarray(log_factor)
 
 
-def surface_stiffness(material: Material, points: SamplePoints, height: float) -> FloatArray:
+def surface_stiffness(material: Material, points: SamplePoints, geometry: Geometry) -> FloatArray:
     """Resistance of the surface to a push (...), over E [1].
 
     A contact's penalty is proportional to it; otherwise a hard skin would be penetrated. It is
@@ -128,4 +126,4 @@ def surface_stiffness(material: Material, points: SamplePoints, height: float) -
     with the matrix around them.
     """
     fibres = 1.0 if material.fibres is None else np.sqrt(material.fibres.stiffness_ratio)
-    return np.asarray(fibres * np.exp(np.maximum(log_stiffness(material, points, height), 0.0)))
+    return np.asarray(fibres * np.exp(np.maximum(log_stiffness(material, points, geometry), 0.0)))

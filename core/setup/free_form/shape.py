@@ -156,6 +156,14 @@ class Shape(Geometry):
     def _distances(self) -> DistanceGrid:
         return DistanceGrid.of(self.vertices, self.triangles)
 
+    def below_skin(self, points: FloatArray) -> FloatArray:
+        """Depth (m,) [m] below the free surface, see `Geometry.below_skin`."""
+        return -self._skin_distances(points)
+
+    @cached_property
+    def _skin_distances(self) -> DistanceGrid:
+        return DistanceGrid.of(self.vertices, self.triangles, self.triangles[~self.held])
+
     @property
     def closed_surface(self) -> tuple[FloatArray, IntArray]:
         """Vertices [m] and triangles as stated, see `Geometry.closed_surface`."""

@@ -145,7 +145,8 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     if lump is not None:
         modulus[in_inclusion(lump, block.places)] *= lump.value("stiffness_ratio")
     if skin is not None:
-        modulus *= layer_factor(skin, height - block.places[..., 2])
+        below = height - block.places[..., 2] if block.below_skin is None else block.below_skin
+        modulus *= layer_factor(skin, below)
     if slope is not None:
         modulus *= gradient_factor(slope, block.places[..., 2] / height)
     return modulus

@@ -77,6 +77,9 @@ class ShapeMesher:
             surface_rest=surface.vertices,
             surface_normals=_vertex_normals(surface.vertices, surface.faces),
             surface_faces=surface.faces.astype(np.int64),
+            below_skin=self.shape.below_skin(block.places.reshape(-1, 3)).reshape(
+                block.weights.shape
+            ),
         )
 
 

@@ -97,6 +97,8 @@ class TetBlock:
         surface_normals: (s, 3) outward at rest; points of several faces that coincide have one
             each.
         surface_faces: (t, 3) triangles of the drawn surface, without the base.
+        below_skin: (e, 4) depth of the volume points below the surface on which a skin lies [m];
+            None for a block, where it is that below the top.
     """
 
     nodes: FloatArray
@@ -110,6 +112,7 @@ class TetBlock:
     surface_rest: FloatArray
     surface_normals: FloatArray
     surface_faces: IntArray
+    below_skin: FloatArray | None = None
 
 
 def mesh_block(size: tuple[float, float, float], grading: TetGrading) -> TetBlock:

@@ -14,7 +14,7 @@ from palpate.foundation.errors import MeshError, SetupError
 from palpate.mesh.box_mesh import GridSpec
 from palpate.mesh.gmsh_fill import TetSpec, fill
 from palpate.setup.free_form.fixed_region import Faces
-from palpate.setup.setup import Box, Detachment, Layer, Material, Setup, Shape, Support, Tool
+from palpate.setup.setup import Box, Detachment, Setup, Shape, Support, Tool
 
 SIZE = (0.06, 0.04, 0.03)
 TOUCH = np.array([[0.01, 0.0, SIZE[2] + 4e-3]])
@@ -148,8 +148,6 @@ def test_finer_mesh_has_closer_nodes():
 
 
 def test_properties_of_a_block_are_refused_for_other_shapes():
-    with pytest.raises(SetupError, match="a layer lies on the flat top of a block"):
-        replace(SETUP, material=Material(layer=Layer(thickness=1e-3, stiffness_ratio=2.0)))
     strip = Support(detached=(Detachment(edge="-x", extent=0.01),))
     replace(SETUP, support=strip)  # flat on z = 0: nothing to say
     with pytest.raises(SetupError, match="only a base that lies in z = 0 can be detached"):

@@ -38,3 +38,17 @@ def test_closed_surfaces_are_closed_and_turn_outwards() -> None:
         assert np.einsum("ti,ti->", a, np.cross(b, c)) / 6 == pytest.approx(body.volume)
         ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         assert (np.unique(ends, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_depth_below_a_skin_is_that_below_the_free_surface_alone() -> None:
+    body = draw_shape("liver", 0)
+    places, outwards = body.surface_points()[::40], 1e-6 * np.array([0.0, 0.0, 1.0])
+    normals = body.facing(places + outwards)[1]
+    high = places[:, 2] > 0.3 * body.height
+    for depth in (0.5e-3, 2e-3, 4e-3):
+        found = body.below_skin(places[high] - depth * normals[high])
+        assert np.median(np.abs(found - depth)) < 0.05e-3 and np.abs(found - depth).max() < 0.5e-3
+    over_base = np.array([[0.0, 0.0, 1e-3]])
+    assert body.below_skin(over_base)[0] > 0.01
+    block = Box(size=(0.06, 0.04, 0.03))
+    assert block.below_skin(np.array([[0.0, 0.0199, 0.02]]))[0] == pytest.approx(0.01)

@@ -110,11 +110,12 @@ def test_outline_is_where_the_change_falls_to_the_level() -> None:
 
 
 def test_cut_through_a_body_is_its_outline() -> None:
-    box = section(Box(size=SIZE), 1, 0.0)
-    assert box.shape == (4, 2, 2) and box[..., 1].max() == SIZE[2]
-    cut = section(Shape(*organ_surface()), 0, 1e-4)
-    ends = np.unique(np.round(cut.reshape(-1, 2), 7), axis=0, return_counts=True)[1]
-    assert (ends == 2).all()  # a closed line
+    box = section(Box(size=SIZE), 1, 1e-4)
+    assert box[..., 1].max() == pytest.approx(SIZE[2])
+    assert np.abs(box[..., 0]).max() == pytest.approx(SIZE[0] / 2)
+    for cut in (box, section(Shape(*organ_surface()), 0, 1e-4)):
+        ends = np.unique(np.round(cut.reshape(-1, 2), 7), axis=0, return_counts=True)[1]
+        assert (ends == 2).all()  # a closed line
 
 
 def test_exchanged_shares_follow_the_other_pushes_forces() -> None:

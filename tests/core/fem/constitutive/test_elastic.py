@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from palpate.fem.constitutive.elastic import Law, lame
 from palpate.fem.constitutive.stiffness_field import log_stiffness
 from palpate.mesh.elements import HEXAHEDRA, Quadrature, quadrature
-from palpate.setup.setup import Layer, Material
+from palpate.setup.setup import Box, Layer, Material
 
 NEO_HOOKE, COROTATIONAL, GENT, FIBRED = (
     Law(),
@@ -264,8 +264,8 @@ def test_gent_material_with_a_far_limit_is_neo_hookean():
     assert np.allclose(far, plain, rtol=1e-7, atol=1e-9 * np.abs(plain).max())
 
 
-def _of(material: Material, height: float, rule: Quadrature) -> np.ndarray:
-    return log_stiffness(material, rule, height)
+def _of(material: Material, geometry: Box, rule: Quadrature) -> np.ndarray:
+    return log_stiffness(material, rule, geometry)
 
 
 @ORDERS
@@ -278,9 +278,8 @@ def test_column_of_uneven_stiffness_deforms_as_springs_in_series(log_ratio, orde
     held[sides | top, 2] = True
     held[:, :2] = True  # with nu = 0 nothing pushes sideways
     material = Material(poisson_ratio=0.0, layer=layer, log_ratio=log_ratio)
-    body = FreeBody(
-        mesh, mesh.nodes, NEO_HOOKE, 0.0, held, log_stiffness=partial(_of, material, height)
-    )
+    uneven = partial(_of, material, Box(size=(0.04, 0.04, height)))
+    body = FreeBody(mesh, mesh.nodes, NEO_HOOKE, 0.0, held, log_stiffness=uneven)
     pressed = mesh.nodes + np.where(top, -1e-6, 0.0)[:, None] * (0, 0, 1)
     _, force = body.equilibrium(pressed, tolerance=1e-7)
     z = np.linspace(0, height, 200_001)
