@@ -21,7 +21,7 @@ from palpate.app.commands.console import (
     print_warnings,
     progress,
 )
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DatasetError, PalpateError, RegistrationError
 from palpate.foundation.progress import part
 
@@ -140,8 +140,12 @@ def replay(
         spec = even or motion_mesh(Use.REPLAY, setup.geometry, setup.tool.radius, centres)
         frames = simulation.replay(setup, centres, spec, times=times, report=part(report, 0.1, 0.8))
         errors = mesh_errors(setup, frames, spec, report=part(report, 0.8, 1.0))
-    mesh = box_mesh(setup.box.size, even or GridSpec(nodes=_NODES))
-    _save_frames(file, mesh, times, centres, frames, errors, made_from(opened.path))
+    surface = (
+        _grid_surface(box_mesh(setup.geometry.size, even or GridSpec(nodes=_NODES)))
+        if setup.geometry.is_block
+        else (setup.surface().vertices, setup.surface().faces)
+    )
+    _save_frames(file, surface, times, centres, frames, errors, made_from(opened.path))
     failed = _failed(frames)
     where = f"{grid} nodes" if even else "a mesh that follows the tool"
     out.print(
@@ -159,24 +163,29 @@ def replay(
         raise typer.Exit(1)
 
 
+def _grid_surface(mesh: BoxMesh) -> tuple[FloatArray, IntArray]:
+    """Vertices (v, 3) [m] and quadrilaterals (q, 4) of a block's free surface."""
+    used, quads = np.unique(mesh.free_surface, return_inverse=True)
+    return mesh.nodes[used], quads.reshape(-1, 4)
+
+
 def _save_frames(
     file: Path,
-    mesh: BoxMesh,
+    surface: tuple[FloatArray, IntArray],
     times: FloatArray,
     centres: FloatArray,
     frames: Sequence[Equilibrium],
     errors: Sequence[MeshErrorEstimate],
     made: dict[str, Any],
 ) -> None:
-    """Write the frames with the surface of a mesh of the block at rest, and `made_from` as JSON."""
-    used, quads = np.unique(mesh.free_surface, return_inverse=True)
-    rest = mesh.nodes[used]
+    """Write the frames with a surface at rest (vertices, faces), and `made_from` as JSON."""
+    rest, faces = surface
     _save(
         file,
         time=times,
         tool=centres,
         rest=rest,
-        faces=quads.reshape(-1, 4),
+        faces=faces,
         vertices=np.stack([frame.move(rest) for frame in frames]),
         force=np.stack([frame.force for frame in frames]),
         residual=np.array([frame.residual for frame in frames]),

@@ -1,5 +1,5 @@
-// Maps of the error on the unfolded box: the top in the middle, the sides folded out. Sides
-// that were never seen are left out.
+// Maps of the error on the unfolded surface. Of a box: the top in the middle, the sides folded out;
+// sides that were never seen are left out. Of any other shape: from above, steep parts folded out.
 import { byId, element, fill } from "./dom.js";
 import { bandIndex, scaleBar } from "./colour-scale.js";
 
@@ -93,8 +93,9 @@ export function patternSection(patterns, size, palette, explained = true) {
       element(
         "p",
         { class: "note" },
-        "Measured surface minus raw simulation in mm, on the unfolded box: the top in the " +
-          "middle, the sides folded out; grey was not seen.",
+        `Measured surface minus raw simulation in mm, seen from above, with ${
+          isBox(patterns.normals) ? "the sides" : "steep parts"
+        } folded out; grey was not seen.`,
       ),
     );
   function enlarge() {
@@ -116,6 +117,7 @@ export function patternSection(patterns, size, palette, explained = true) {
  * @returns {UnfoldedBox}
  */
 function unfoldPatches({ centres, normals, measured }, size) {
+  if (!isBox(normals)) return unfoldFreeForm(centres, normals);
   /** @type {Record<FaceName, Patch[]>} */
   const byFace = { top: [], "+x": [], "-x": [], "+y": [], "-y": [] };
   centres.forEach((centre, index) => {
@@ -135,6 +137,36 @@ function unfoldPatches({ centres, normals, measured }, size) {
     .map((k) => Math.min(...rects.map((r) => r[k])))
     .concat([2, 3].map((k) => Math.max(...rects.map((r) => r[k]))));
   return { faces, bounds };
+}
+
+/**
+ * Whether all patches lie on faces of a box along the axes.
+ * @param {number[][]} normals
+ * @returns {boolean}
+ */
+function isBox(normals) {
+  return normals.every((normal) => Math.max(...normal.map(Math.abs)) > 0.999);
+}
+
+/**
+ * Place the patches of a free form from above, steep ones farther out the lower they are.
+ * @param {number[][]} centres
+ * @param {number[][]} normals
+ * @returns {UnfoldedBox}
+ */
+function unfoldFreeForm(centres, normals) {
+  const top = Math.max(...centres.map(([, , z]) => z));
+  /** @type {Patch[]} */
+  const patches = centres.map(([x, y, z], index) => {
+    const [u, v] = normals[index];
+    const out = Math.hypot(u, v) * (top - z);
+    return { index, at: [x + u * out, y + v * out] };
+  });
+  const spacing = medianSpacing(patches);
+  const bounds = [0, 1]
+    .map((k) => Math.min(...patches.map(({ at }) => at[k])) - spacing)
+    .concat([0, 1].map((k) => Math.max(...patches.map(({ at }) => at[k])) + spacing));
+  return { faces: [{ name: "top", patches, rect: bounds, spacing }], bounds };
 }
 
 /**
