@@ -54,10 +54,14 @@ ON_SHAPES = (
 )
 """Effects that the bench can hide in a free form."""
 _SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
-_PUSHES = 2
+_PUSHES = 3
 """Pushes of a sequence."""
 _FELT = 6e-3
 """Distance of a lump from a pushed place within which it is felt [m]."""
+_LARGEST_LUMP = 0.36
+"""Largest radius of a lump over the height of the surface above it [1]."""
+_POINTS = 4.5e5
+"""Points in a cloud for each square metre of the body's free surface [1/m^2]."""
 _MARKS = 6
 """Landmarks on the surface."""
 
@@ -115,19 +119,23 @@ def draw_shape_scenario(
     drawn = draw_scenario(seed, effects, among=among).effects
     hidden = tuple(_lump(shape, rng) if one.effect == "stiff_inclusion" else one for one in drawn)
     mass = round(1000.0 * shape.volume, 5)
-    scenario = Scenario(effects=hidden, sequences=_SEQUENCES, size=shape.size, mass=mass)
+    corners = shape.corners[~shape.held]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    density = round(_POINTS * float(np.linalg.norm(across, axis=1).sum()) / 2)
+    scenario = Scenario(
+        effects=hidden, sequences=_SEQUENCES, size=shape.size, mass=mass, density=density
+    )
     return ShapeScenario(family=family, seed=seed, scenario=scenario)
 
 
 def _lump(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
-    """Draw a stiff ball close under the upper part of the surface."""
-    radius = float(rng.uniform(6.5e-3, 8.5e-3))
-    above = _above(shape)
-    places, normals = reachable_places(shape, "poke-top", above, radius)
+    """Draw a stiff ball close under the upper part of the surface, which shows on it."""
+    places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
     row = int(rng.integers(len(places)))
-    centre = places[row] - normals[row] * (radius + rng.uniform(2e-3, 3.5e-3))
+    radius = min(float(rng.uniform(8e-3, 10e-3)), _LARGEST_LUMP * float(places[row, 2]))
+    centre = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
     values = {name: round(float(value), 5) for name, value in zip("xyz", centre, strict=True)}
-    ratio = round(float(rng.uniform(4.0, 8.0)), 2)
+    ratio = round(float(rng.uniform(6.0, 12.0)), 2)
     return HiddenEffect(
         "stiff_inclusion", {**values, "radius": round(radius, 5), "stiffness_ratio": ratio}
     )

@@ -85,6 +85,9 @@ class FigureCriteria:
     pattern_smoothing: float = threshold(
         3.5e-3, "m", "Standard deviation of the smoothing of error patterns along a side."
     )
+    fold: float = threshold(
+        1e-3, "m", "Gap between the top of an error pattern and its upright sides."
+    )
     least_points: int = threshold(5, "1", "Fewest points behind a shown value of a pattern.")
     least_force_change: float = threshold(
         5.0, "%", "Smallest change of the force that fills the colour scale."
@@ -162,6 +165,12 @@ class DesignCriteria:
     )
     side_height: float = threshold(
         0.6, "1", "Height at which sides are pushed, over the block's height."
+    )
+    upright: float = threshold(
+        0.85, "1", "Height of a free form's normal from which a push counts as one from above."
+    )
+    reached: float = threshold(
+        0.34, "1", "Height of a free form's normal from which a tool reaches the surface."
     )
     drag_length: float = threshold(0.012, "m", "Length of a drag.")
     step: float = threshold(1e-3, "1", "Step of a derivative, in the parameter's scale.")

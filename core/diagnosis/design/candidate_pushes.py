@@ -28,9 +28,6 @@ _NAMED = {
     "+y": "into the +y side",
 }
 
-_UPRIGHT, _REACHED = np.cos(np.radians(32.0)), np.cos(np.radians(70.0))
-"""Height of a normal [1] from which a push counts as one from above, and from which a tool reaches
-the surface."""
 Touched = tuple[str, tuple[float, float, float], tuple[float, float, float]]
 """Side, place [m] and unit vector into the body."""
 
@@ -147,7 +144,7 @@ def pushes(
     touched = _on_block(setup) if geometry.is_block else _on_free_form(geometry)
     straight = [
         Push(
-            kind="top" if -into[2] > _UPRIGHT else "side",
+            kind="top" if -into[2] > CRITERIA.design.upright else "side",
             side=side,
             into=into,
             place=place,
@@ -191,7 +188,7 @@ def _on_free_form(geometry: Geometry) -> list[Touched]:
     normals = geometry.facing(places)[1]
     for place, normal in zip(places, normals, strict=True):
         near = any(np.linalg.norm(place - other) < CRITERIA.design.spacing for other in kept)
-        if normal[2] > _REACHED and not near:
+        if normal[2] > CRITERIA.design.reached and not near:
             kept.append(place)
             (x, y, z), (u, v, w) = place.tolist(), (-normal).tolist()
             found.append((_SURFACE, (x, y, z), (u, v, w)))

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ErrorPatterns", "draw_patterns", "error_patterns", "patterns_figure"]
 
-_FOLD = 1e-3
-"""Gap between the top of the picture and its upright sides [m]."""
-
 
 @dataclass(frozen=True, eq=False)
 class ErrorPatterns:
@@ -225,6 +222,6 @@ def _drawn(axes: Any, patterns: ErrorPatterns, values: FloatArray, limit: float)
 def _unfolded(patterns: ErrorPatterns) -> FloatArray:
     """Places (p, 2) [m] of the patches from above, the upright ones folded outwards."""
     centres, normals = patterns.centres, patterns.normals
-    below = centres[:, 2].max() - centres[:, 2] + _FOLD
+    below = centres[:, 2].max() - centres[:, 2] + CRITERIA.figures.fold
     level = np.linalg.norm(normals[:, :2], axis=1, keepdims=True)
     return np.asarray(centres[:, :2] + normals[:, :2] * level * below[:, None])

@@ -18,7 +18,7 @@ _LEAST_HEIGHT = 0.4
 """Least height of a pushed place over the body's height [1]."""
 _RISE: Mapping[str, tuple[float, float]] = {"poke-top": (0.85, 1.01), "poke-side": (0.5, 0.85)}
 """Least and largest height of the surface's normal, by kind of push [1]."""
-_DEPTH, _DEEPEST = (4.5e-3, 7e-3), 0.3
+_DEPTH, _DEEPEST = (5e-3, 8e-3), 0.3
 """Depth of a push [m], and largest depth over the height of the place [1]."""
 
 

@@ -32,7 +32,7 @@ def test_dataset_is_registered_where_it_was_taken(tmp_path: Path) -> None:
         recorded = experiment.dataset.sequence(name)
         centres = experiment.stated.phantom_from_robot.apply(recorded.kinematics.position)
         gap = experiment.dataset.geometry.gap(centres, 5e-3).min()
-        assert -7.5e-3 < gap < -3e-3
+        assert -8.5e-3 < gap < -3e-3
         assert len(recorded) > 10
 
 
@@ -56,11 +56,11 @@ def test_pushes_go_in_along_the_normal_and_come_from_above(family: str) -> None:
         plan = push_motion(f"{kind}-01", shape, places[:2], normals[:2], 5e-3, rng)
         times = np.linspace(0.0, plan.duration, 400)
         gap = shape.gap(plan.centre(times), 5e-3)
-        assert -7.5e-3 < gap.min() < -1e-3 and gap[0] > 5e-3 and gap[-1] > 5e-3
+        assert -8.5e-3 < gap.min() < -1e-3 and gap[0] > 5e-3 and gap[-1] > 5e-3
 
 
 def test_what_no_shape_can_have_is_refused() -> None:
-    with pytest.raises(EffectError, match="cannot hide 'surface_layer' in a shape"):
-        draw_shape_scenario("dome", 1, 0, ("surface_layer",))
+    with pytest.raises(EffectError, match="cannot hide 'tool_friction' in a shape"):
+        draw_shape_scenario("dome", 1, 0, ("tool_friction",))
     with pytest.raises(SetupError, match="there is no shape 'cube'; there are dome, liver"):
         draw_shape_scenario("cube", 1, 0)
