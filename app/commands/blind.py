@@ -23,6 +23,8 @@ from palpate.app.reporting.blind_tables import (
 )
 from palpate.blind import (
     RESULTS_FILE,
+    SHAPED,
+    Case,
     CaseResult,
     all_cases,
     draw_cases,
@@ -32,6 +34,7 @@ from palpate.blind import (
     run_suite,
     summary_of,
     with_nuisances,
+    with_shapes,
 )
 from palpate.foundation.errors import RunError
 
@@ -97,6 +100,14 @@ def blind(
             "temporal, or '' for none; drawn if omitted.",
         ),
     ] = None,
+    shapes: Annotated[
+        bool,
+        typer.Option(
+            "--shapes",
+            help="Phantoms of other shapes than a block, one family after the other; kinds are "
+            "control, clear and pair.",
+        ),
+    ] = False,
     any_version: Annotated[
         bool, typer.Option("--any-version", help="Also use results of other versions of the code.")
     ] = False,
@@ -131,12 +142,7 @@ def blind(
     hidden, kept = _split(effects), folder / "kept"
     if keep and datasets is not None:
         raise typer.BadParameter("--keep stores the datasets itself; leave --datasets out")
-    if scenarios is None:
-        if kinds is not None:
-            raise typer.BadParameter("--kinds needs --scenarios, the number of cases to draw")
-        cases = all_cases(seed, CONTROLS if controls is None else controls, hidden, short)
-    else:
-        cases = draw_cases(seed, scenarios, _split(kinds), hidden, controls, short)
+    cases = _cases_of(seed, scenarios, _split(kinds), hidden, controls, short=short, shapes=shapes)
     if nuisances or camera is not None or filters is not None:
         cases = with_nuisances(cases, camera, _split(filters))
     cases = [case for case in cases if only is None or only in case.name]
@@ -165,6 +171,30 @@ def blind(
     out.print(f"{folder / 'report.html'}", highlight=False, soft_wrap=True)
     if kept.exists():
         print_serve_command(kept)
+
+
+def _cases_of(
+    seed: int,
+    scenarios: int | None,
+    kinds: list[str] | None,
+    effects: list[str] | None,
+    controls: int | None,
+    *,
+    short: bool,
+    shapes: bool,
+) -> list[Case]:
+    """The cases that these options ask for."""
+    if scenarios is None:
+        if kinds is not None or shapes:
+            option = "--shapes" if shapes else "--kinds"
+            raise typer.BadParameter(f"{option} needs --scenarios, the number of cases to draw")
+        return all_cases(seed, CONTROLS if controls is None else controls, effects, short)
+    if not shapes:
+        return draw_cases(seed, scenarios, kinds, effects, controls, short)
+    from palpate.synthetic import ON_SHAPES
+
+    drawn = draw_cases(seed, scenarios, kinds or SHAPED, effects or ON_SHAPES, controls)
+    return with_shapes(drawn)
 
 
 def _nothing_of(folder: Path, cases: int) -> str:

@@ -6,7 +6,17 @@ errors, coverage and calibration, against the targets.
 """
 
 from palpate.blind.case_results import RESULTS_FILE, CaseResult, read_results
-from palpate.blind.cases import KINDS, MIX, Case, all_cases, draw_cases, scenario_of, with_nuisances
+from palpate.blind.case_scenarios import drawn_of, scenario_of
+from palpate.blind.cases import (
+    KINDS,
+    MIX,
+    SHAPED,
+    Case,
+    all_cases,
+    draw_cases,
+    with_nuisances,
+    with_shapes,
+)
 from palpate.blind.run_suite import known_results, run_case, run_suite
 from palpate.blind.summary import summary_of
 
@@ -14,10 +24,12 @@ __all__ = [
     "KINDS",
     "MIX",
     "RESULTS_FILE",
+    "SHAPED",
     "Case",
     "CaseResult",
     "all_cases",
     "draw_cases",
+    "drawn_of",
     "known_results",
     "read_results",
     "run_case",
@@ -25,4 +37,5 @@ __all__ = [
     "scenario_of",
     "summary_of",
     "with_nuisances",
+    "with_shapes",
 ]

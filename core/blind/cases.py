@@ -1,28 +1,26 @@
-"""Blind cases: their kinds and mix, and the scenario that follows from a case's seed."""
+"""Blind cases: their kinds and mix."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from palpate.foundation.errors import RunError
 
-if TYPE_CHECKING:
-    from palpate.synthetic import Scenario
-
 __all__ = [
     "ALIKE",
     "KINDS",
     "MIX",
+    "SHAPED",
     "Case",
     "all_cases",
     "draw_cases",
-    "scenario_of",
     "with_nuisances",
+    "with_shapes",
 ]
 
 KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus", "fault")
@@ -30,6 +28,9 @@ KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus", "f
 outside the catalogue; one effect of the family that looks alike; another Young's modulus alone,
 which does not show without a measured force; a fault of the bench that effects state
 (`palpate.synthetic.Nuisance.causes`). A drawn suite has no fault unless it is asked for."""
+
+SHAPED = ("control", "clear", "pair")
+"""Kinds of cases that the bench makes of shapes other than a block."""
 
 MIX: Mapping[str, float] = {
     "control": 0.25,
@@ -73,6 +74,7 @@ class Case:
             3 mm of depth noise.
         camera: name of a camera in place of a drawn one; None for a drawn one.
         filters: names of the filters on its images; None for a drawn one.
+        shape: family of the phantom's shape; None for a block.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Case:
     nuisances: bool = False
     camera: str | None = None
     filters: tuple[str, ...] | None = None
+    shape: str | None = None
 
     @property
     def noisy(self) -> bool:
@@ -94,7 +97,7 @@ class Case:
         values = asdict(self) | {"hidden": list(self.hidden)}
         if self.filters is not None:
             values["filters"] = list(self.filters)
-        bench = ("nuisances", "camera", "filters")
+        bench = ("nuisances", "camera", "filters", "shape")
         return {
             name: value
             for name, value in values.items()
@@ -198,61 +201,28 @@ def with_nuisances(
     return [replace(case, nuisances=True, camera=camera, filters=chosen) for case in cases]
 
 
-def scenario_of(case: Case) -> Scenario:
-    """The scenario of a case, from its kind, its hidden names and its seed alone."""
-    from palpate.synthetic import (
-        FILTERS,
-        SHORT_PROTOCOL,
-        Scenario,
-        draw_disturbance,
-        draw_nuisances,
-        draw_scenario,
-    )
-    from palpate.synthetic.laws import with_second_laws
+def with_shapes(cases: Sequence[Case]) -> list[Case]:
+    """The same cases with phantoms of other shapes than a block, one family after the other.
 
-    if case.kind in ("control", "fault"):
-        scenario = Scenario()
-    elif case.kind == "outside":
-        scenario = Scenario(
-            disturbances=tuple(draw_disturbance(name, case.seed) for name in case.hidden)
-        )
-    else:
-        scenario = draw_scenario(
-            case.seed, effects=len(case.hidden), clear=case.kind != "subtle", among=case.hidden
-        )
-    if case.kind == "twins":
-        scenario = _pressing(scenario)
-    # A slip of a millimetre is not noticed, and the block is not put back.
-    scenario = replace(scenario, put_back=scenario.hidden("base_slip") is None)
-    if case.nuisances or case.kind == "fault":
-        drawn = draw_nuisances(
-            case.seed,
-            noisy=case.noisy,
-            camera=case.camera,
-            filters=case.filters,
-            faults=case.hidden if case.kind == "fault" else (),
-        )
-        names = tuple(name for name, kind in FILTERS.items() if kind in map(type, drawn))
-        # Every other user knows the settings of the camera's driver.
-        declared = names if case.seed // 2 % 2 else ()
-        scenario = replace(scenario, nuisances=drawn, declared_filters=declared)
-    if case.nuisances:
-        scenario = with_second_laws(scenario, case.seed)
-    return replace(scenario, sequences=SHORT_PROTOCOL) if case.short else scenario
+    Raises RunError for a kind of case or an effect that the bench cannot make of a shape.
+    """
+    from palpate.synthetic import FAMILIES, ON_SHAPES
 
-
-def _pressing(scenario: Scenario) -> Scenario:
-    """Turn a hidden offset of the tool into the vertical, where it looks like others of ALIKE."""
-    from palpate.synthetic import HiddenEffect
-
-    offset = scenario.hidden("tool_offset")
-    if offset is None:
-        return scenario
-    length = float(np.linalg.norm([offset.value(name) for name in ("dx", "dy", "dz")]))
-    deeper = round(float(np.copysign(length, offset.value("dz"))), 5)
-    return replace(
-        scenario, effects=(HiddenEffect("tool_offset", {"dx": 0.0, "dy": 0.0, "dz": deeper}),)
-    )
+    for case in cases:
+        unknown = [name for name in case.hidden if name not in ON_SHAPES]
+        if case.kind not in SHAPED or case.nuisances or unknown:
+            what = unknown[0] if unknown else "nuisances" if case.nuisances else case.kind
+            raise RunError(
+                f"{case.name}: the virtual bench has no {what} on a shape; kinds are "
+                f"{', '.join(SHAPED)}, and effects {', '.join(ON_SHAPES)}",
+                case=case.name,
+            )
+    families = list(FAMILIES)
+    return [
+        replace(case, name=f"{case.name}-{family}", shape=family)
+        for number, case in enumerate(cases)
+        for family in [families[number % len(families)]]
+    ]
 
 
 def _checked_kinds(kinds: Sequence[str] | None) -> list[str]:

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from palpate.blind.case_results import RESULTS_FILE, CaseResult, add_result, read_results
-from palpate.blind.cases import Case, scenario_of
+from palpate.blind.case_scenarios import drawn_of
+from palpate.blind.cases import Case
 from palpate.foundation.errors import RunError
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
@@ -125,10 +126,10 @@ def run_case(
             None keeps only the result.
         store: folder of made datasets, which stay there and are used again; None makes each anew.
     """
-    from palpate.blind.dataset_store import stored_dataset
+    from palpate.blind.dataset_store import make_drawn, stored_dataset
     from palpate.dataset import open_dataset
     from palpate.diagnosis.pipeline import diagnose
-    from palpate.synthetic import make_dataset
+    from palpate.synthetic import Scenario
 
     place, doing, began, seconds = (
         kept or folder / case.name,
@@ -144,13 +145,14 @@ def run_case(
     hidden: list[dict[str, Any]] = []
     outside: list[dict[str, Any]] = []
     try:
-        scenario = scenario_of(case)
+        drawn = drawn_of(case)
+        scenario = drawn if isinstance(drawn, Scenario) else drawn.scenario
         for older in (dataset, run):
             shutil.rmtree(older, ignore_errors=True)
         if store is None:
-            made = make_dataset(dataset, scenario, case.seed)
+            made = make_drawn(dataset, drawn, case.seed)
         else:
-            dataset, made = stored_dataset(store, case.name, scenario, case.seed)
+            dataset, made = stored_dataset(store, case.name, drawn, case.seed)
         hidden, outside = _truth(made, scenario.size)
         doing, began = "diagnosing it", time.monotonic()
         result = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)

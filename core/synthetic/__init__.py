@@ -5,6 +5,7 @@ finite-element solver with another mesh, element and material law than the repla
 `make_palpation` and `make_shape_dataset` write whole datasets with their truth beside them.
 """
 
+from palpate.synthetic.bodies.shape_families import FAMILIES
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
 from palpate.synthetic.make_shape_dataset import (
@@ -37,6 +38,7 @@ from palpate.synthetic.scenario.truth_file import Truth, read_truth, truth_path
 __all__ = [
     "CAMERAS",
     "DISTURBANCES",
+    "FAMILIES",
     "FAULTS",
     "FILTERS",
     "HIDDEN",

@@ -12,7 +12,7 @@ from looping import LATE_CLOCK, Loop
 
 from palpate.app.reporting.blind_page import blind_page
 from palpate.blind import summary_of
-from palpate.blind.cases import scenario_of
+from palpate.blind.case_scenarios import scenario_of
 from palpate.effects import DIAGNOSED, from_json
 
 pytestmark = pytest.mark.timeout(2400)

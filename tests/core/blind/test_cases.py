@@ -6,11 +6,33 @@ from dataclasses import replace
 
 import pytest
 
-from palpate.blind import KINDS, MIX, Case, all_cases, draw_cases, scenario_of, with_nuisances
+from palpate.blind import (
+    KINDS,
+    MIX,
+    SHAPED,
+    Case,
+    all_cases,
+    draw_cases,
+    drawn_of,
+    scenario_of,
+    with_nuisances,
+    with_shapes,
+)
 from palpate.blind.cases import ALIKE
 from palpate.effects import DIAGNOSED
 from palpate.foundation.errors import RunError
-from palpate.synthetic import DISTURBANCES, FAULTS, FILTERS, HIDDEN, QUICK, SHORT_PROTOCOL, WEIGHED
+from palpate.synthetic import (
+    DISTURBANCES,
+    FAMILIES,
+    FAULTS,
+    FILTERS,
+    HIDDEN,
+    ON_SHAPES,
+    QUICK,
+    SHORT_PROTOCOL,
+    WEIGHED,
+    ShapeScenario,
+)
 
 FILTERS_USED = set(FILTERS.values())
 
@@ -193,3 +215,30 @@ def test_faults_are_drawn_where_they_are_asked_for() -> None:
     for case in cases:
         kinds = {type(one).__name__ for one in scenario_of(case).nuisances}
         assert kinds & set(FAULTS) == set(case.hidden)
+
+
+def test_cases_of_shapes_have_each_family_in_turn_and_the_same_body_each_time() -> None:
+    cases = with_shapes(draw_cases(5, 8, SHAPED, ON_SHAPES))
+    assert {case.shape for case in cases} == set(FAMILIES)
+    assert all(case.name.endswith(str(case.shape)) for case in cases)
+    for case in cases:
+        drawn = drawn_of(case)
+        assert isinstance(drawn, ShapeScenario)
+        assert {one.effect for one in drawn.scenario.effects} == set(case.hidden)
+        assert Case.from_json(case.to_json()) == case
+    again = drawn_of(cases[0])
+    assert isinstance(again, ShapeScenario) and again == drawn_of(cases[0])
+    assert "shape" not in draw_cases(5, 1)[0].to_json()
+
+
+@pytest.mark.parametrize(
+    ("case", "message"),
+    [
+        (Case("a", 1, "outside", ("ripple",)), "has no ripple on a shape"),
+        (Case("a", 1, "clear", ("base_slip",)), "has no base_slip on a shape"),
+        (Case("a", 1, "control", nuisances=True), "has no nuisances on a shape"),
+    ],
+)
+def test_cases_that_no_shape_can_be_are_refused(case: Case, message: str) -> None:
+    with pytest.raises(RunError, match=message):
+        with_shapes([case])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from virtual_push import hide
 
-from palpate.blind.cases import Case, scenario_of
+from palpate.blind import Case, scenario_of
 from palpate.foundation.frames import Transform
 from palpate.synthetic.laws import SECOND_LAWS, with_second_laws
 from palpate.synthetic.laws.sensor_laws import camera_motion, clock_offset, depth_curvature
