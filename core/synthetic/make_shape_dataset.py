@@ -1,7 +1,7 @@
 """Virtual datasets of a free form under a depth camera: its surface, clouds, forces, and the truth.
 
 The body is drawn from a family of shapes, pushed along its normals where the camera sees it, and
-solved by the virtual bench's own solver. One push of each sequence is over a hidden lump.
+solved by the virtual bench's own solver. All pushes but one of each sequence are over a hidden lump.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ _PUSHES = 3
 """Pushes of a sequence."""
 _FELT = 6e-3
 """Distance of a lump from a pushed place within which it is felt [m]."""
+_THICK = 0.75
+"""Least height of the surface above a lump over the body's height [1]."""
 _LARGEST_LUMP = 0.36
 """Largest radius of a lump over the height of the surface above it [1]."""
 _POINTS = 4.5e5
@@ -131,7 +133,8 @@ def draw_shape_scenario(
 def _lump(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
     """Draw a stiff ball close under the upper part of the surface, which shows on it."""
     places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    row = int(rng.integers(len(places)))
+    high = np.flatnonzero(places[:, 2] > _THICK * shape.height)
+    row = int(rng.choice(high))
     radius = min(float(rng.uniform(8e-3, 10e-3)), _LARGEST_LUMP * float(places[row, 2]))
     centre = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
     values = {name: round(float(value), 5) for name, value in zip("xyz", centre, strict=True)}
@@ -228,8 +231,8 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
         over = _over_lump(drawn, places)
         for number, name in enumerate(own):
             rows = chosen[number :: len(own)]
-            if len(over):
-                rows = np.append(rows[1:], rng.choice(over))
+            if len(over) > 1:
+                rows = np.append(rows[:1], rng.choice(over, _PUSHES - 1, replace=False))
             found.append(push_motion(name, shape, places[rows], normals[rows], radius, rng))
     return sorted(found, key=lambda one: names.index(one.name))
 
