@@ -1,7 +1,8 @@
 """Virtual datasets of a free form under a depth camera: its surface, clouds, forces, and the truth.
 
 The body is drawn from a family of shapes, pushed along its normals where the camera sees it, and
-solved by the virtual bench's own solver. All pushes but one of each sequence are over a hidden lump.
+solved by the virtual bench's own solver. All pushes but one of each sequence are over a hidden
+lump.
 """
 
 from __future__ import annotations
