@@ -136,17 +136,11 @@ class Experiment:
         return motion_mesh(Use.REPLAY, stated, self.setup.tool.radius, centres)
 
     def mesh(self, use: Use, sequences: Iterable[str]) -> Meshing:
-        """The mesh of a use for replays of some sequences, whatever the model."""
-        centres = [np.zeros((1, 3))]
-        for name in sequences:
-            kinematics = self.dataset.sequence(name).kinematics
-            centres.append(
-                self.stated.phantom_from_robot.apply(
-                    kinematics.position_at(_thinned(np.asarray(kinematics.time)))
-                )
-            )
-        every = np.concatenate(centres[1:] or centres)
-        return motion_mesh(use, self.stated.geometry, self.stated.tool.radius, every)
+        """The mesh of a use for replays of sequences, of which there is at least one."""
+        streams = [self.dataset.sequence(name).kinematics for name in sequences]
+        places = [one.position_at(_thinned(np.asarray(one.time))) for one in streams]
+        centres = self.stated.phantom_from_robot.apply(np.concatenate(places))
+        return motion_mesh(use, self.stated.geometry, self.stated.tool.radius, centres)
 
     def observe(
         self,
