@@ -41,6 +41,7 @@ class InferenceProblem:
         forces: whether any sequence has forces.
         clouds: whether any sequence has clouds.
         pushes: places and outward normals (k, 3) of the pushes of sequences without clouds.
+        contacts: the same of what the tool touches in any fitted sequence.
         catalogue: effects to choose from.
     """
 
@@ -54,6 +55,7 @@ class InferenceProblem:
     forces: bool = False
     clouds: bool = True
     pushes: tuple[FloatArray, FloatArray] = field(default_factory=_no_pushes)
+    contacts: tuple[FloatArray, FloatArray] = field(default_factory=_no_pushes)
     catalogue: Sequence[type[Effect]] = CATALOGUE
 
     @cached_property

@@ -29,6 +29,7 @@ def problem_of_dataset(
     """
     setup = experiment.stated
     grid, fine, coarse = _meshes(setup, [*fitted, *held_out])
+    touched = contact_places(fitted, setup)
     clouds, at_rest = any(not item.force_only for item in fitted), None
     if clouds:
         cloud = experiment.dataset.rest_cloud()
@@ -44,6 +45,7 @@ def problem_of_dataset(
         forces=any(item.forces for item in fitted),
         clouds=clouds,
         pushes=pushed_places(fitted, setup),
+        contacts=(touched, setup.geometry.facing(touched)[1]),
     )
 
 

@@ -1,4 +1,4 @@
-"""Places of inclusions that are tried: a grid in the block, or below the pushes."""
+"""Places of inclusions that are tried: a grid in a block, or below what the tool touches."""
 
 from __future__ import annotations
 
@@ -8,20 +8,28 @@ from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
 from palpate.effects.elastic_material import inclusion_grid
 from palpate.foundation.arrays import FloatArray
-from palpate.setup.setup import Box, Inclusion, Shape
+from palpate.setup.phantom_geometry import Geometry
+from palpate.setup.setup import Inclusion
 
 __all__ = ["inclusion_places", "inclusions_under"]
 
 
 def inclusion_places(problem: InferenceProblem) -> tuple[Inclusion, ...]:
-    """Return the coarse grid of inclusions in the block; without clouds those below the pushes."""
-    if problem.clouds:
+    """Return the inclusions that are tried.
+
+    They are a coarse grid in a block under a camera. A free form may be large and thin; there, as
+    without clouds, they lie below the places that the tool touches.
+    """
+    geometry = problem.setup.geometry
+    if not problem.clouds:
+        return inclusions_under(*problem.pushes, geometry)
+    if geometry.is_block:
         return inclusion_grid(problem.setup)
-    return inclusions_under(*problem.pushes, problem.setup.geometry)
+    return inclusions_under(*problem.contacts, geometry)
 
 
 def inclusions_under(
-    places: FloatArray, normals: FloatArray, body: Box | Shape
+    places: FloatArray, normals: FloatArray, body: Geometry
 ) -> tuple[Inclusion, ...]:
     """Return inclusions below places of the surface whose centres are in the body.
 
