@@ -110,6 +110,8 @@ class Replay(FixedBaseReplay):
                 return self._step(centre, start, time)
         except WorkSpentError:
             self._model, self._mesh, self.slip = None, None, slip
+        finally:
+            self.budget.end_frame()
         return replace(start, tool=tool, path=(), outcome=Outcome.GIVEN_UP, residual=np.inf)
 
     def _step(self, centre: FloatArray, start: Equilibrium, time: float | None) -> Equilibrium:

@@ -20,12 +20,14 @@ class WorkSpentError(Exception):
 class WorkBudget:
     """The work of the present push.
 
+    Work between frames (derivatives, a finer mesh) does not count: it could not be given up.
+
     Attributes:
         given_up: whether the present push was given up.
     """
 
     def __init__(self) -> None:
-        self.given_up = False
+        self.given_up, self._counting = False, False
         self._spent, self._most = 0.0, PER_PUSH
 
     def begin_frame(self, clear: bool) -> None:
@@ -33,9 +35,16 @@ class WorkBudget:
         if clear:
             self.given_up, self._spent, self._most = False, 0.0, PER_PUSH
         self._most += PER_FRAME
+        self._counting = True
+
+    def end_frame(self) -> None:
+        """End a frame; what follows until the next one does not count."""
+        self._counting = False
 
     def spend(self, work: float) -> None:
         """Count work, in factorisations; raises WorkSpentError above the budget."""
+        if not self._counting:
+            return
         self._spent += work
         if self._spent > self._most:
             self.given_up = True

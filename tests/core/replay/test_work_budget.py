@@ -71,3 +71,16 @@ def test_replay_tells_what_time_is_left(monkeypatch: pytest.MonkeyPatch) -> None
     replay(SETUP, CENTRES, GRID, report=lambda _, text: told.append(text))
     assert told[0] == "frame 1 of 8" and told[-1].startswith("frame 8 of 8, about ")
     assert told[-1].endswith(" s left")
+
+
+def test_work_between_frames_does_not_count() -> None:
+    """Derivatives at a frame are solved outside of it, where nothing could be given up."""
+    budget = WorkBudget()
+    budget.begin_frame(clear=True)
+    budget.end_frame()
+    budget.spend(1e9)
+    assert not budget.given_up
+    budget.begin_frame(clear=False)
+    with pytest.raises(WorkSpentError):
+        budget.spend(1e9)
+    assert budget.given_up
