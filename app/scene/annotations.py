@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from palpate.app.drawing import colours
 from palpate.app.drawing.figures import Figure, LinesFigure, SurfaceFigure, float32
@@ -23,6 +24,8 @@ CROSS, TOUCH = 2.5e-3, 7e-4
 """Size of a landmark's cross and radius of a touch's bead [m]."""
 TICK, TICKS_APART = 2.6e-3, 3.2e-3
 """Length and spacing of the hatching [m]."""
+BASE = 1e-3
+"""Vertices up to this height over the lowest belong to the base [m]."""
 AHEAD = (196, 201, 208)
 """Colour of the tool's path after the current frame."""
 
@@ -68,11 +71,16 @@ class Annotations:
             "landmarks-touches": SurfaceFigure(float32(beads), turns, colours.TOOL),
         }
 
-    def base_figures(self, low: FloatArray, high: FloatArray, extended: bool) -> dict[str, Figure]:
-        """Hatching around the fixed base of a block between these corners (3,)."""
-        corners = np.array(
-            [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
-        )
+    def base_figures(self, rest: FloatArray, extended: bool) -> dict[str, Figure]:
+        """Hatching around the fixed base.
+
+        Args:
+            rest: (v, 3) vertices of the body at rest [m].
+            extended: whether the extended model is shown, whose base may be loose.
+        """
+        low, high = rest.min(axis=0), rest.max(axis=0)
+        base = rest[rest[:, 2] < low[2] + BASE, :2].astype(float)
+        corners = base[ConvexHull(base).vertices]
         ticks = []
         for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
             along = (end - begin) / np.linalg.norm(end - begin)

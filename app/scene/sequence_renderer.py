@@ -214,9 +214,7 @@ class SequenceRenderer:
         if "landmarks" in view.layers:
             figures.update(self._annotations.landmark_figures())
         if "base" in view.layers:
-            figures.update(
-                self._annotations.base_figures(*self.corners, extended=layer.model != "raw")
-            )
+            figures.update(self._annotations.base_figures(self._rest, layer.model != "raw"))
         if "lump" in view.layers and not (suffix and layer.model == "raw"):
             figures.update(self._annotations.lump_figures(layer, view.frame, view.opacity("lump")))
         return {f"{name}{suffix}": figure for name, figure in figures.items()}, points

@@ -194,7 +194,13 @@ export function drawPlot(canvas, series, frame, [first, last]) {
   pen.textAlign = "left";
   pen.textBaseline = "top";
   pen.fillStyle = ink("text-2");
-  for (const [title, at] of titles) pen.fillText(title, LEFT + 5, at + 2);
+  // A margin in the colour of the page keeps a title legible where a line runs through it.
+  pen.strokeStyle = ink("surface");
+  pen.lineWidth = 4;
+  for (const [title, at] of titles) {
+    pen.strokeText(title, LEFT + 5, at + 2);
+    pen.fillText(title, LEFT + 5, at + 2);
+  }
   const at = x(series.time[frame]);
   strokeLine(
     pen,

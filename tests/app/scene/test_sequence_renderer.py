@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shapes import dome
 from small_dataset import SIZE, small_cloud
 
 from palpate.app.drawing.colours import BANDS, EXTENDED, RAW, SEQUENTIAL, SIGNED, band_of
@@ -16,11 +17,12 @@ from palpate.app.drawing.figures import (
     ToolFigure,
 )
 from palpate.app.drawing.view import Layer, View
-from palpate.app.scene.annotations import annotations_of
+from palpate.app.scene.annotations import Annotations, annotations_of
 from palpate.app.scene.page_session import Session
 from palpate.app.scene.picture import Picture
 from palpate.app.scene.sequence_renderer import MOST_TRIANGLES, SequenceRenderer
 from palpate.app.storage.run_store import Run
+from palpate.setup.box import Box
 
 ALL: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
 
@@ -217,6 +219,22 @@ def test_lump_landmarks_base_and_path_are_layers(renderer: SequenceRenderer) -> 
     assert interval.opacity < ball.opacity < 1
     assert {"base", "path"} <= set(picture.of(LinesFigure))
     assert renderer.lumps == 1 and renderer.landmarks == 0
+
+
+def test_hatching_follows_the_base_of_a_free_form_and_of_a_block() -> None:
+    none = np.empty((0, 3))
+    bare = Annotations(none, none)
+    for body in (dome((0.04, 0.03, 0.025)), Box(size=(0.06, 0.04, 0.03))):
+        figure = bare.base_figures(body.surface().vertices, extended=False)["base"]
+        assert isinstance(figure, LinesFigure)
+        ends = figure.segments.reshape(-1, 3).astype(float) * [1.0, 1.0, 0.0]
+        assert np.abs(body.outside(ends)).max() < 3e-3
+        assert len(figure.segments) > 50
+    loose = Annotations(none, none, loose=(("-x", 0.02),))
+    block = Box(size=(0.06, 0.04, 0.03)).surface().vertices
+    whole, part = (loose.base_figures(block, extended)["base"] for extended in (False, True))
+    assert isinstance(whole, LinesFigure) and isinstance(part, LinesFigure)
+    assert len(part.segments) < len(whole.segments)
 
 
 def test_who_asks_while_a_picture_is_drawn_is_told_the_last_view_with_its_own_picture(
