@@ -11,7 +11,7 @@ from palpate.foundation.source_digest import source_digest
 if TYPE_CHECKING:
     from palpate.synthetic import Scenario, ShapeScenario, Truth
 
-__all__ = ["BENCH", "make_drawn", "place_of", "stored_dataset"]
+__all__ = ["BENCH", "make_drawn", "place_of", "scenario_in", "stored_dataset"]
 
 BENCH = ("foundation", "mesh", "setup", "synthetic")
 """Folders of `core` that the virtual bench imports."""
@@ -21,6 +21,13 @@ def place_of(store: Path, name: str, scenario: Scenario | ShapeScenario, seed: i
     """Return the folder of a dataset: another one for each bench, scenario and seed."""
     text = f"{scenario!r} {seed} {source_digest(*BENCH)}"
     return store / hashlib.sha256(text.encode()).hexdigest()[:16] / name
+
+
+def scenario_in(drawn: Scenario | ShapeScenario) -> Scenario:
+    """Beliefs and hidden effects of a case on a block or on another shape."""
+    from palpate.synthetic import ShapeScenario
+
+    return drawn.scenario if isinstance(drawn, ShapeScenario) else drawn
 
 
 def make_drawn(folder: Path, drawn: Scenario | ShapeScenario, seed: int) -> Truth:
@@ -43,11 +50,10 @@ def stored_dataset(
         scenario: to be made.
         seed: of everything random.
     """
-    from palpate.synthetic import Scenario, read_truth
+    from palpate.synthetic import read_truth
 
     folder = place_of(store, name, scenario, seed)
     if folder.is_dir():
-        believed = scenario if isinstance(scenario, Scenario) else scenario.scenario
-        return folder, read_truth(folder, believed)
+        return folder, read_truth(folder, scenario_in(scenario))
     folder.parent.mkdir(parents=True, exist_ok=True)
     return folder, make_drawn(folder, scenario, seed)

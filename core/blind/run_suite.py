@@ -126,10 +126,9 @@ def run_case(
             None keeps only the result.
         store: folder of made datasets, which stay there and are used again; None makes each anew.
     """
-    from palpate.blind.dataset_store import make_drawn, stored_dataset
+    from palpate.blind.dataset_store import make_drawn, scenario_in, stored_dataset
     from palpate.dataset import open_dataset
     from palpate.diagnosis.pipeline import diagnose
-    from palpate.synthetic import Scenario
 
     place, doing, began, seconds = (
         kept or folder / case.name,
@@ -146,7 +145,7 @@ def run_case(
     outside: list[dict[str, Any]] = []
     try:
         drawn = drawn_of(case)
-        scenario = drawn if isinstance(drawn, Scenario) else drawn.scenario
+        scenario = scenario_in(drawn)
         for older in (dataset, run):
             shutil.rmtree(older, ignore_errors=True)
         if store is None:

@@ -32,7 +32,7 @@ from palpate.synthetic.bodies.organ_shape import (
     write_surface,
 )
 from palpate.synthetic.bodies.shape_mesher import lump_grading
-from palpate.synthetic.bodies.shape_pushes import spread_places
+from palpate.synthetic.bodies.shape_pushes import spread_places, timed_push
 from palpate.synthetic.dataset_writer import (
     write_felt_config,
     write_forces,
@@ -214,24 +214,9 @@ def _motion(
         way = np.array(
             [hover, deep] if palpation.body == "box" else [[hover[0], hover[1], top], hover, deep]
         )
-        pushes.append(_timed(way, time, rng))
+        pushes.append(timed_push(way, time, rng))
         time = float(pushes[-1].times[-1]) + rng.uniform(0.5, 0.8)
     return MotionPlan(name, np.array([0.0, 0.0, -1.0]), tuple(pushes), time + 1.5)
-
-
-def _timed(way: FloatArray, begin: float, rng: np.random.Generator) -> PlannedPush:
-    """Time a push: fast to the stop before the surface, slowly in, a hold, and back."""
-    arcs = PlannedPush(way, np.zeros(1), np.zeros(1)).corners
-    far, hover, deep = float(arcs[-2]), float(arcs[-2]), float(arcs[-1])
-    steps = [(0.0, 0.0)]
-    if far > 0:
-        steps += [(far / 40e-3 + 0.2, hover), (0.3, hover)]
-    steps += [((deep - hover) / rng.uniform(5e-3, 8e-3), deep), (rng.uniform(0.7, 0.9), deep)]
-    steps += [((deep - hover) / 10e-3, hover)]
-    if far > 0:
-        steps += [(far / 40e-3 + 0.2, 0.0)]
-    durations, stops = np.array(steps).T
-    return PlannedPush(way, begin + np.cumsum(durations), stops)
 
 
 def _normals(palpation: Palpation, places: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.setup.free_form.shape import Shape
 from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
 
-__all__ = ["push_motion", "reachable_places", "spread_places"]
+__all__ = ["push_motion", "reachable_places", "spread_places", "timed_push"]
 
 _HOVER, _ABOVE = 5e-3, 12e-3
 """Distance from the surface before a push, and height of the travel above everything [m]."""
@@ -71,22 +71,21 @@ def push_motion(
         depth = min(rng.uniform(*_DEPTH), _DEEPEST * place[2])
         hover, deep = place + (radius + _HOVER) * normal, place + (radius - depth) * normal
         way = np.array([[hover[0], hover[1], max(top, hover[2] + 1e-3)], hover, deep])
-        pushes.append(_timed(way, time, rng))
+        pushes.append(timed_push(way, time, rng))
         time = float(pushes[-1].times[-1]) + rng.uniform(0.5, 0.8)
     return MotionPlan(name, np.array([0.0, 0.0, -1.0]), tuple(pushes), time + 0.8)
 
 
-def _timed(way: FloatArray, begin: float, rng: np.random.Generator) -> PlannedPush:
+def timed_push(way: FloatArray, begin: float, rng: np.random.Generator) -> PlannedPush:
     """Time a push: fast to the stop before the surface, slowly in, a hold, and back."""
     arcs = PlannedPush(way, np.zeros(1), np.zeros(1)).corners
     hover, deep = float(arcs[-2]), float(arcs[-1])
-    steps = [
-        (0.0, 0.0),
-        (hover / 40e-3 + 0.2, hover),
-        ((deep - hover) / rng.uniform(5e-3, 8e-3), deep),
-        (rng.uniform(0.5, 0.7), deep),
-        ((deep - hover) / 10e-3, hover),
-        (hover / 40e-3 + 0.2, 0.0),
-    ]
+    steps = [(0.0, 0.0)]
+    if hover > 0:
+        steps += [(hover / 40e-3 + 0.2, hover), (0.3, hover)]
+    steps += [((deep - hover) / rng.uniform(5e-3, 8e-3), deep), (rng.uniform(0.7, 0.9), deep)]
+    steps += [((deep - hover) / 10e-3, hover)]
+    if hover > 0:
+        steps += [(hover / 40e-3 + 0.2, 0.0)]
     durations, stops = np.array(steps).T
     return PlannedPush(way, begin + np.cumsum(durations), stops)
