@@ -81,14 +81,17 @@ class Annotations:
         low, high = rest.min(axis=0), rest.max(axis=0)
         base = rest[rest[:, 2] < low[2] + BASE, :2].astype(float)
         corners = base[ConvexHull(base).vertices]
+        edges = np.roll(corners, -1, axis=0) - corners
+        lengths = np.linalg.norm(edges, axis=1)
+        ends = np.cumsum(lengths)
         ticks = []
-        for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            along = (end - begin) / np.linalg.norm(end - begin)
-            count = int(np.linalg.norm(end - begin) / TICKS_APART)
-            for at in begin + along * TICKS_APART * (np.arange(count)[:, None] + 0.5):
-                if not (extended and self._is_loose(at, low, high)):
-                    outwards = np.array([along[1], -along[0]])
-                    ticks.append([at, at + TICK * (outwards - along) / np.sqrt(2)])
+        for way in np.arange(0.5 * TICKS_APART, ends[-1], TICKS_APART):
+            edge = int(np.searchsorted(ends, way))
+            along = edges[edge] / lengths[edge]
+            at = corners[edge] + (way - ends[edge] + lengths[edge]) * along
+            if not (extended and self._is_loose(at, low, high)):
+                outwards = np.array([along[1], -along[0]])
+                ticks.append([at, at + TICK * (outwards - along) / np.sqrt(2)])
         outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
         flat = np.concatenate([outline, np.array(ticks).reshape(-1, 2, 2)])
         return {

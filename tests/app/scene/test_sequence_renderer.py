@@ -17,7 +17,7 @@ from palpate.app.drawing.figures import (
     ToolFigure,
 )
 from palpate.app.drawing.view import Layer, View
-from palpate.app.scene.annotations import Annotations, annotations_of
+from palpate.app.scene.annotations import TICK, TICKS_APART, Annotations, annotations_of
 from palpate.app.scene.page_session import Session
 from palpate.app.scene.picture import Picture
 from palpate.app.scene.sequence_renderer import MOST_TRIANGLES, SequenceRenderer
@@ -229,7 +229,9 @@ def test_hatching_follows_the_base_of_a_free_form_and_of_a_block() -> None:
         assert isinstance(figure, LinesFigure)
         ends = figure.segments.reshape(-1, 3).astype(float) * [1.0, 1.0, 0.0]
         assert np.abs(body.outside(ends)).max() < 3e-3
-        assert len(figure.segments) > 50
+        lengths = np.linalg.norm(np.diff(figure.segments, axis=1)[:, 0], axis=1)
+        ticks = np.abs(lengths - TICK) < 1e-6
+        assert ticks.sum() == pytest.approx(lengths[~ticks].sum() / TICKS_APART, abs=1)
     loose = Annotations(none, none, loose=(("-x", 0.02),))
     block = Box(size=(0.06, 0.04, 0.03)).surface().vertices
     whole, part = (loose.base_figures(block, extended)["base"] for extended in (False, True))
