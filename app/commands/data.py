@@ -88,10 +88,8 @@ def register(dataset: Folder) -> None:
         *_pose(registration.phantom_from_camera, registration.camera_covariance),
     )
     out.print(table)
-    out.print(
-        f"touches miss their landmarks by {1e3 * registration.touch_rms:.2f} mm RMS",
-        highlight=False,
-    )
+    if registration.robot is not None:
+        out.print(registration.robot.summary, highlight=False)
     if registration.weak_directions:
         out.print(f"weakly determined: {', '.join(registration.weak_directions)}", highlight=False)
     print_warnings(registration.warnings)
@@ -283,13 +281,15 @@ def _print_summary(
         )
     out.print(table)
     size = " × ".join(f"{1e3 * edge:.1f}" for edge in summary.size)
-    touches = ""
-    if registration:
-        touches = f", missing their landmarks by {1e3 * registration.touch_rms:.2f} mm RMS"
+    touches = f"{len(summary.touches)} touches"
+    if registration and registration.robot is not None:
+        touches = (
+            f"{touches}, {registration.robot.summary}"
+            if summary.touches
+            else (registration.robot.summary)
+        )
     tool = f"tool radius {1e3 * summary.tool_radius:.1f} mm"
-    out.print(
-        f"phantom {size} mm, {tool}, {len(summary.touches)} touches{touches}", highlight=False
-    )
+    out.print(f"phantom {size} mm, {tool}, {touches}", highlight=False)
     felt = [one for one in summary.sequences if one.forces]
     if felt:
         fitted = any(one.split in ("train", "validation") for one in felt)

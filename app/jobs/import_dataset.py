@@ -71,8 +71,10 @@ def _import(request: dict[str, Any], aside: Path, whole: Path, note: Path, repor
     try:
         with limited_memory(_MEMORY):
             root = _filled(request, archive, aside, part(report, 0.0, 0.4))
-            surface = read_config(root).surface
-        if surface:  # its check needs a library that maps more address space than the limit
+            shape = read_config(root).shape
+        if (
+            shape is not None
+        ):  # its check needs a library that maps more address space than the limit
             importlib.import_module("open3d")
         with limited_memory(_MEMORY):
             refuse_problems(root, part(report, 0.4, 1.0))

@@ -138,8 +138,9 @@ def annotations_of(run: Run) -> Annotations:
     misses = np.array(touching.get("misses") or np.zeros_like(landmarks), dtype=float).reshape(
         -1, 3
     )
+    lifts = np.array(touching.get("normals") or [[0.0, 0.0, 1.0]], dtype=float)
     touches = (
-        landmarks + misses + [0.0, 0.0, float(touching.get("lift", 0.0))]
+        landmarks + misses + float(touching.get("lift", 0.0)) * lifts
         if len(misses) == len(landmarks)
         else landmarks
     )

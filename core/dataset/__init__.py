@@ -4,7 +4,8 @@
 `dataset_problems` lists everything that is wrong with it.
 """
 
-from palpate.dataset.folder import Dataset, Touches, open_dataset
+from palpate.dataset.contact_points import Touches, Traces
+from palpate.dataset.folder import Dataset, open_dataset
 from palpate.dataset.schema import DatasetConfig
 from palpate.dataset.sequence import Forces, Kinematics, Sequence
 
@@ -15,5 +16,6 @@ __all__ = [
     "Kinematics",
     "Sequence",
     "Touches",
+    "Traces",
     "open_dataset",
 ]

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TypeVar
 
 from palpate.dataset.cloud import read_cloud
+from palpate.dataset.contact_points import TOUCHES, TRACES, read_touches, read_traces
 from palpate.dataset.csv_table import read_labelled, row_problems
 from palpate.dataset.folder import (
     check_folder,
     check_span,
     check_splits,
     open_dataset,
-    read_touches,
     sequence_names,
     stated,
 )
@@ -62,7 +62,11 @@ def find_problems(root: Path, report: Report = silent) -> list[PalpateError]:
     seen = _Found()
     seen.of(lambda: check_folder(root))
     config = seen.of(lambda: stated(root))
-    seen.all(row_problems(root, "touches.csv", "landmark,x,y,z", label=0))
+    if (root / "touches.csv").exists():
+        seen.all(row_problems(root, "touches.csv", TOUCHES, label=0))
+    if (root / "traces.csv").exists():
+        seen.all(row_problems(root, "traces.csv", TRACES, label=0))
+        seen.of(lambda: read_traces(root))
     if config is not None:
         given = config[0]
         seen.of(lambda: read_touches(root, given))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -10,54 +10,28 @@ import numpy as np
 
 from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.dataset.cloud import read_cloud, read_header
-from palpate.dataset.csv_table import FIRST_ROW, check_coordinates, read_labelled
+from palpate.dataset.contact_points import Touches, Traces, read_touches, read_traces
 from palpate.dataset.files import problem
-from palpate.dataset.schema import FILE, DatasetConfig, nearest, read_config
+from palpate.dataset.schema import DatasetConfig, read_config
 from palpate.dataset.sequence import Sequence, read_sequence
 from palpate.dataset.shape_from_file import read_shape
-from palpate.foundation.arrays import FloatArray
+from palpate.dataset.statements.checked_keys import FILE, nearest
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.setup.setup import Box, Shape
 
 __all__ = [
     "Dataset",
-    "Touches",
     "check_folder",
     "check_span",
     "check_splits",
     "open_dataset",
-    "read_touches",
     "sequence_names",
     "stated",
 ]
 
-FEWEST_TOUCHES = 4
-"""Least number of touches; three leave no residual."""
 _BAGS = (".bag", ".db3", ".mcap")
-
-
-FARTHEST_REPEAT = 5e-3
-"""Largest distance between repeated touches of one landmark [m]."""
-LEAST_FREEDOM = 6
-"""Fewest degrees of freedom from which repeats tell the deviation of a touch."""
-
-
-@dataclass(frozen=True, eq=False)
-class Touches:
-    """Touches of landmarks.
-
-    Attributes:
-        names: (n) of the landmarks, each once.
-        positions: (n, 3) tool centres at the touches [m], robot frame; the mean of a landmark that
-            was touched more than once.
-        deviation: standard deviation of one coordinate of a touch [m], as repeats show it; None
-            where too few landmarks were touched again.
-    """
-
-    names: tuple[str, ...]
-    positions: FloatArray
-    deviation: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +45,8 @@ class Dataset:
         has_rest: whether there is a rest cloud.
         loaded: the sequences, sorted by name.
         geometry: stated geometry of the phantom.
+        traces: of the tool over the untouched surface.
+        holders: vertices (v, 3) [m], phantom frame, and triangles (t, 3) of rigid things in view.
         accepted: registration of the camera in place of the automatic one; None without.
     """
 
@@ -80,6 +56,8 @@ class Dataset:
     has_rest: bool
     loaded: tuple[Sequence, ...]
     geometry: Box | Shape
+    traces: Traces = field(default_factory=Traces)
+    holders: tuple[tuple[FloatArray, IntArray], ...] = ()
     accepted: AcceptedRegistration | None = None
 
     @property
@@ -160,8 +138,8 @@ def open_dataset(path: Path | str) -> Dataset:
     """
     root = Path(path)
     check_folder(root)
-    config, geometry = stated(root)
-    touches = read_touches(root, config)
+    config, geometry, holders = stated(root)
+    touches, traces = read_touches(root, config), read_traces(root)
     sequences = tuple(read_sequence(root, name) for name in sequence_names(root))
     check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
@@ -174,16 +152,21 @@ def open_dataset(path: Path | str) -> Dataset:
     has_rest = observed or (root / "rest.ply").exists()
     if has_rest:
         read_header(root, "rest.ply")
-    return Dataset(root, config, touches, has_rest, sequences, geometry)
+    return Dataset(root, config, touches, has_rest, sequences, geometry, traces, holders)
 
 
-def stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
-    """Read dataset.toml and the phantom's geometry."""
+def stated(
+    root: Path,
+) -> tuple[DatasetConfig, Box | Shape, tuple[tuple[FloatArray, IntArray], ...]]:
+    """Read dataset.toml, the phantom's geometry, and the surfaces of what holds it; see
+    `Dataset.holders`.
+    """
     config = read_config(root)
-    if not config.surface:
-        return config, Box(size=config.size)
-    shape = read_shape(root, config.surface)
-    return replace(config, size=shape.size), shape
+    if config.shape is None:
+        return config, Box(size=config.size), ()
+    found = read_shape(root, config.shape)
+    config = config.in_phantom_frame(found.shape.size, found.phantom_from_file)
+    return config, found.shape, found.holders
 
 
 def check_folder(root: Path) -> None:
@@ -199,85 +182,6 @@ def check_folder(root: Path) -> None:
         f"{root} {reason}; expected the folder of a dataset, with dataset.toml in it",
         file=str(root),
     )
-
-
-def read_touches(root: Path, config: DatasetConfig) -> Touches:
-    """Read and check the touches of the landmarks."""
-    file = "touches.csv"
-    names, positions = read_labelled(root, file, "landmark,x,y,z", label=0)
-    for row, name in enumerate(names, FIRST_ROW):
-        if name not in config.landmarks:
-            raise problem(
-                file,
-                f"unknown landmark '{name}'; {nearest(name, config.landmarks)}",
-                row=row,
-                key="landmark",
-                value=name,
-            )
-    check_coordinates(file, positions)
-    _check_repeats(file, names, positions)
-    names, positions, deviation = _averaged_repeats(names, positions)
-    if len(names) < FEWEST_TOUCHES:
-        text = (
-            f"{len(names)} touches; expected at least {FEWEST_TOUCHES}: three determine a pose "
-            "without any residual "
-            "to judge it by, touch another landmark"
-        )
-        raise problem(file, text, row=FIRST_ROW + len(names), value=len(names))
-    _check_touch_scale(file, positions, np.array([config.landmarks[name] for name in names]))
-    return Touches(tuple(names), positions, deviation)
-
-
-def _check_repeats(file: str, names: list[str], positions: FloatArray) -> None:
-    """Refuse repeated touches of one landmark that are too far apart to be of the same place."""
-    firsts: dict[str, int] = {}
-    for row, name in enumerate(names):
-        first = firsts.setdefault(name, row)
-        apart = float(np.linalg.norm(positions[row] - positions[first]))
-        if apart > FARTHEST_REPEAT:
-            text = (
-                f"landmark '{name}' was touched in row {first + FIRST_ROW} already, "
-                f"{1e3 * apart:.1f} mm from here; expected repeats within "
-                f"{1e3 * FARTHEST_REPEAT:.0f} mm: name the right landmark, or remove one of them"
-            )
-            raise problem(file, text, row=row + FIRST_ROW, key="landmark", value=name)
-
-
-def _averaged_repeats(
-    names: list[str], positions: FloatArray
-) -> tuple[list[str], FloatArray, float | None]:
-    """Average repeated touches; return names, positions and the deviation as of `Touches`."""
-    unique = list(dict.fromkeys(names))
-    if len(unique) == len(names):
-        return unique, positions, None
-    numbers = {name: number for number, name in enumerate(unique)}
-    which = np.array([numbers[name] for name in names])
-    counts = np.bincount(which)
-    means = np.stack([np.bincount(which, axis) / counts for axis in positions.T], axis=1)
-    means.flags.writeable = False
-    freedom = 3 * (len(names) - len(unique))
-    if freedom < LEAST_FREEDOM:
-        return unique, means, None
-    return unique, means, float(np.sqrt(((positions - means[which]) ** 2).sum() / freedom))
-
-
-def _check_touch_scale(file: str, positions: FloatArray, landmarks: FloatArray) -> None:
-    touched, stated = (
-        float(np.linalg.norm(points - points.mean(0), axis=1).max())
-        for points in (positions, landmarks)
-    )
-    if stated == 0:
-        raise problem(
-            FILE,
-            "landmarks: all touched ones are the same point; expected distinct ones: correct them",
-            key="landmarks",
-        )
-    if not 0.1 < touched / stated < 10:
-        text = (
-            f"the touches reach {touched:.3g} m from their centre, the landmarks {stated:.3g} "
-            "m; expected the same unit, metres"
-        )
-        raise problem(file, text + ": convert one of them", row=FIRST_ROW, value=f"{touched:.3g}")
 
 
 def sequence_names(root: Path) -> list[str]:

@@ -1,4 +1,5 @@
-"""Correction of the robot's registration for touches that were not at the stated landmarks.
+"""Correction of the robot's registration for touches that were not at the stated landmarks, and for
+traces over another surface than the stated one.
 
 A registration fits the touches to their landmarks by a rigid motion. If the landmarks sagged, the
 block has another size, or other places were touched, then the same touches, fitted to the true
@@ -18,8 +19,9 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.mesh.protocol import Meshing
 from palpate.registration.robot.robot_fit import rigid_fits
+from palpate.registration.robot.trace_fit import refit_traces
 from palpate.replay.replay import rest
-from palpate.setup.setup import Setup, Touching
+from palpate.setup.setup import Setup, Touching, Tracing
 
 __all__ = ["touch_correction", "touch_misses", "touched_places"]
 
@@ -35,11 +37,26 @@ def touched_places(setup: Setup) -> FloatArray:
 
 def touch_correction(setup: Setup, grid: Meshing) -> Transform:
     """Motion from the stated to the true phantom_from_robot; `grid` is used for the sag."""
+    if setup.tracing is not None:
+        return _trace_correction(setup, setup.tracing, grid)
     if _as_stated(setup):
         return Transform()
     made, places = _touched_and_expected(setup, grid)
     rotation, translation, _ = rigid_fits(made, places[None])
     return Transform(rotation[0], translation[0])
+
+
+def _trace_correction(setup: Setup, tracing: Tracing, grid: Meshing) -> Transform:
+    """Motion that puts the traced points on the surface of the true body, as it sags."""
+    sags, geometry = setup.load.specific_weight_over_stiffness, setup.geometry
+    if not (sags or setup.registered is not None or setup.tool.radius != tracing.radius):
+        return Transform()
+    centres = np.array(tracing.centres)
+    if sags:
+        gaps, normals = geometry.facing(centres)
+        feet = geometry.nearest(centres - gaps[:, None] * normals)
+        centres = centres - (rest(setup, grid).move(feet) - feet)
+    return refit_traces(centres, geometry, setup.tool.radius)
 
 
 def touch_misses(setup: Setup, grid: Meshing) -> FloatArray:
@@ -54,18 +71,26 @@ def touch_misses(setup: Setup, grid: Meshing) -> FloatArray:
 def _as_stated(setup: Setup) -> bool:
     """Whether the touches need no correction; fewer than three register nothing."""
     stated = setup.touching
-    plain = Touching(misses=stated.misses, lift=stated.lift, deviation=stated.deviation)
+    plain = Touching(
+        misses=stated.misses, lift=stated.lift, normals=stated.normals, deviation=stated.deviation
+    )
     moved = (
-        setup.load.specific_weight_over_stiffness or setup.registered is not None or stated != plain
+        setup.load.specific_weight_over_stiffness
+        or setup.registered is not None
+        or stated != plain
+        or (stated.normals and stated.lift != setup.tool.radius)
     )
     return len(setup.landmarks) < 3 or not moved
 
 
 def _touched_and_expected(setup: Setup, grid: Meshing) -> tuple[FloatArray, FloatArray]:
     """Tool centres (n, 3) [m] by the stated registration, and expected at the true places."""
-    landmarks, lift = np.array(setup.landmarks), np.array([0.0, 0.0, setup.touching.lift])
-    misses = np.array(setup.touching.misses) if setup.touching.misses else np.zeros_like(landmarks)
+    landmarks, touching = np.array(setup.landmarks), setup.touching
+    up = np.array(touching.normals) if touching.normals else np.array([0.0, 0.0, 1.0])
+    misses = np.array(touching.misses) if touching.misses else np.zeros_like(landmarks)
     places = touched_places(setup)
     if setup.load.specific_weight_over_stiffness:
         places = rest(setup, grid).move(places)
-    return landmarks + misses + lift, places + lift
+    # A ball that rests on the surface is off it by its true radius.
+    lift = setup.tool.radius if touching.normals else touching.lift
+    return landmarks + misses + touching.lift * up, places + lift * up

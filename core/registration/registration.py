@@ -1,20 +1,21 @@
-"""Registration of a dataset: robot to phantom from touches, and camera to phantom from the rest
-cloud, with warnings.
+"""Registration of a dataset: robot to phantom from touches, traces or stated poses, and camera to
+phantom from the rest cloud, with warnings.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.dataset import Dataset
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.foundation.progress import Report, silent
 from palpate.registration.camera.accepted_camera import accepted_camera_fit
 from palpate.registration.camera.camera_fit import CameraFit
-from palpate.registration.camera.heading import tool_misfit
 from palpate.registration.rest_fit import fit_rest_cloud, refine_rest_cloud
 from palpate.registration.robot.landmark_pairing import TouchProposal, propose_pairing
 from palpate.registration.robot.landmark_repair import (
@@ -23,14 +24,21 @@ from palpate.registration.robot.landmark_repair import (
     find_repairs,
     resized_repair,
 )
-from palpate.registration.robot.robot_fit import RobotFit, fit_robot
+from palpate.registration.robot.robot_fit import RobotFit
+from palpate.registration.robot.robot_statements import (
+    disagreements,
+    from_hand_eye,
+    robot_fits,
+    touched_centres,
+)
+from palpate.registration.settled_poses import settled_poses
 from palpate.registration.uncertainty import PRIOR
-from palpate.setup.setup import Material, Sensor, Setup, Tool, Touching
+from palpate.setup.setup import Material, Sensor, Setup, Tool, Touching, Tracing
 
 __all__ = ["Registration", "register", "setup_from"]
 
-_DECIDED = 3.0e-3
-"""Distance of the tool [m] by which one of several poses must fit better to be chosen."""
+_WEAK = 1.0e-3
+"""Standard deviation of the robot's pose beyond which a warning is given [m]."""
 DOUBTFUL_TOUCHES = 2.0e-3
 """RMS of the touches beyond which a warning is given [m]."""
 
@@ -44,11 +52,12 @@ class Registration:
     one: `small_motion(vector, pivot) @ phantom_from_...`.
 
     Attributes:
-        phantom_from_robot: from the touches.
+        phantom_from_robot: from touches, traces or stated poses.
         robot_covariance: (6, 6) of `phantom_from_robot`.
-        robot_pivot: (3,) centroid of the touched landmarks [m].
-        touch_residuals: (n, 3) [m], phantom frame, moved touch minus landmark.
-        touch_rms: root mean square length of the residuals [m].
+        robot_pivot: (3,) centroid of the touched landmarks, or middle of the phantom [m].
+        touch_residuals: (n, 3) [m], phantom frame, moved touch minus landmark; empty without
+            touches.
+        touch_rms: root mean square length of the residuals, or of the gaps of traced points [m].
         phantom_from_camera: from the rest cloud.
         camera_covariance: (6, 6) of `phantom_from_camera`.
         camera_pivot: (3,) centre of the block's top [m].
@@ -58,6 +67,7 @@ class Registration:
         camera: the camera fit with its statistics; None without a rest cloud or without clouds.
         repair: pairing and size of the touched polygon that the reduction of the measurement uses;
             None where the stated ones are used.
+        robot: the fit of the robot that leads.
     """
 
     phantom_from_robot: Transform
@@ -73,6 +83,7 @@ class Registration:
     proposal: TouchProposal | None
     camera: CameraFit | None
     repair: LandmarkRepair | None = None
+    robot: RobotFit | None = None
 
     @property
     def repaired(self) -> Registration:
@@ -94,22 +105,26 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
 
     Camera to phantom is that of the accepted registration, where the dataset has one.
     """
-    report(0.0, "robot to phantom from touches")
-    robot, proposal = _register_robot(dataset)
-    warnings = _touch_warnings(robot, proposal)
+    report(0.0, "robot to phantom")
+    fits = robot_fits(dataset)
+    proposal = _proposal(dataset)
     report(0.2, "camera to phantom from the rest cloud")
     camera, repairs = None, _repairs(dataset, proposal)
     repair = repairs[0] if repairs else None
+    warnings: tuple[str, ...] = ()
     if dataset.has_rest and dataset.observed:
-        camera = _register_camera(dataset)
+        camera = _register_camera(dataset, fits)
+        hand_eye = from_hand_eye(dataset, camera)
+        fits = fits if hand_eye is None else (*fits, hand_eye)
+        robot = _leading(fits)
         report(0.7, "which way round the phantom lies")
         # An automatic heading follows the tool; a given heading decides between repairs.
         if not camera.automatic:
             repair = choose_repair(dataset, repairs, camera.phantom_from_camera)
-        camera = _settle_heading(
-            dataset, (repair.fit if repair else robot).phantom_from_robot, camera
-        )
-        warnings += camera.warnings
+        robot, camera = settled_poses(dataset, robot, camera, repair)
+        warnings = camera.warnings
+    robot = robot if camera else _leading(fits)
+    warnings = (*_robot_warnings(robot, proposal), *disagreements(robot, fits[1:]), *warnings)
     report(1.0, "registered")
     return Registration(
         phantom_from_robot=robot.phantom_from_robot,
@@ -125,13 +140,18 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
         proposal=proposal,
         camera=camera,
         repair=repair,
+        robot=robot,
     )
 
 
 def setup_from(dataset: Dataset, registration: Registration) -> Setup:
     """The setup that the experimenter believes in, with the registrations and their touches."""
     config = dataset.config
-    misses = tuple((float(x), float(y), float(z)) for x, y, z in registration.touch_residuals)
+    touched = [np.asarray(config.landmarks[name]) for name in dataset.touches.names]
+    lifts = [touched_centres(dataset)[name] for name in dataset.touches.names]
+    radius = config.tool_radius
+    normals = (np.array(lifts) - touched) / radius if config.ball_touches and touched else ()
+    traced = np.zeros((0, 3)) if registration.robot is None else registration.robot.traced
     return Setup(
         geometry=dataset.geometry,
         tool=Tool(radius=config.tool_radius),
@@ -144,39 +164,63 @@ def setup_from(dataset: Dataset, registration: Registration) -> Setup:
         mass=config.mass,
         landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
         touching=Touching(
-            misses=misses,
-            lift=config.touch_offset,
+            misses=_rows(registration.touch_residuals),
+            lift=radius if config.ball_touches else config.touch_offset,
+            normals=_rows(normals),
             deviation=config.touch_sigma or dataset.touches.deviation,
         ),
+        tracing=None if not len(traced) else Tracing(centres=_rows(traced), radius=radius),
         phantom_from_robot=registration.phantom_from_robot,
         phantom_from_camera=registration.phantom_from_camera,
     )
 
 
-def _register_camera(dataset: Dataset) -> CameraFit:
-    """Camera to phantom: as accepted, where a registration was; else from the rest cloud."""
+def _register_camera(dataset: Dataset, fits: Sequence[RobotFit]) -> CameraFit:
+    """Camera to phantom: as accepted, where a registration was; else from the rest cloud.
+
+    A hand-eye calibration gives a first guess where none is stated.
+    """
     cloud, config, accepted = dataset.rest_cloud(), dataset.config, dataset.accepted
     if accepted is None:
-        return fit_rest_cloud(cloud, dataset.geometry, config.depth_sigma, config.to_phantom)
+        guess, hand_eye = config.to_phantom, config.robot_from_camera
+        if guess is None and hand_eye is not None and fits and not fits[0].alternatives:
+            guess = fits[0].phantom_from_robot @ hand_eye.pose
+        return fit_rest_cloud(cloud, dataset.geometry, config.depth_sigma, guess)
     start = accepted.phantom_from_camera
     fit = refine_rest_cloud(cloud, dataset.geometry, start, config.depth_sigma)
     return accepted_camera_fit(fit, accepted)
 
 
-def _register_robot(dataset: Dataset) -> tuple[RobotFit, TouchProposal | None]:
-    config, touches = dataset.config, dataset.touches
-    lift = np.array([0.0, 0.0, config.touch_offset])
-    expected = {name: np.asarray(place) + lift for name, place in config.landmarks.items()}
-    robot = fit_robot(touches.positions, np.array([expected[name] for name in touches.names]))
-    return robot, propose_pairing(
-        touches.names, touches.positions, expected, dataset.geometry, _tool_starts(dataset)
+def _leading(fits: Sequence[RobotFit]) -> RobotFit:
+    """The fit that the registration uses."""
+    if not fits:
+        raise RegistrationError(
+            "nothing relates the robot to the phantom: [camera] robot_from_camera needs clouds; "
+            "add touches.csv, traces.csv or [robot] phantom_from_robot",
+            file="dataset.toml",
+        )
+    return fits[0]
+
+
+def _proposal(dataset: Dataset) -> TouchProposal | None:
+    """Another pairing or size of the touches that fits better; None without touches."""
+    touches = dataset.touches
+    if not touches.names:
+        return None
+    return propose_pairing(
+        touches.names,
+        touches.positions,
+        touched_centres(dataset),
+        dataset.geometry,
+        _tool_starts(dataset),
     )
 
 
 def _repairs(dataset: Dataset, proposal: TouchProposal | None) -> tuple[LandmarkRepair, ...]:
-    config, touches = dataset.config, dataset.touches
-    lift = np.array([0.0, 0.0, config.touch_offset])
-    expected = np.array([np.asarray(config.landmarks[name]) + lift for name in touches.names])
+    touches, centres = dataset.touches, touched_centres(dataset)
+    if not touches.names:
+        return ()
+    expected = np.array([centres[name] for name in touches.names])
     repairs = find_repairs(touches.positions, expected, dataset.geometry, _tool_starts(dataset))
     if repairs or proposal is None or proposal.scale == 1.0:
         return repairs
@@ -188,9 +232,9 @@ def _tool_starts(dataset: Dataset) -> FloatArray:
     return np.array([dataset.sequence(name).kinematics.position[0] for name in dataset.sequences])
 
 
-def _touch_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[str, ...]:
+def _robot_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[str, ...]:
     warnings: tuple[str, ...] = (proposal.sentence,) if proposal else ()
-    if robot.rms > DOUBTFUL_TOUCHES:
+    if len(robot.residuals) and robot.rms > DOUBTFUL_TOUCHES:
         worst = np.linalg.norm(robot.residuals, axis=1)
         warnings += (
             f"The touches miss their landmarks by {robot.rms * 1e3:.1f} mm RMS (at most "
@@ -198,53 +242,21 @@ def _touch_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[st
             f"row {worst.argmax() + 1}; under {DOUBTFUL_TOUCHES * 1e3:.0f} mm is expected): "
             "what is found from this registration is doubtful.",
         )
+    if robot.alternatives:
+        warnings += (
+            f"{robot.source}: the points fit the phantom in {len(robot.alternatives) + 1} poses "
+            "alike; the first is used: trace more of the surface, touch landmarks, or state "
+            "[robot] phantom_from_robot.",
+        )
+    spread = np.sqrt(np.diag(robot.covariance))
+    if len(robot.traced) and (off := float(spread[:3].max())) > _WEAK:
+        warnings += (
+            f"{robot.source} determines the robot's place along {'xyz'[int(spread[:3].argmax())]} "
+            f"within {1e3 * off:.1f} mm only: trace more of the surface.",
+        )
     return warnings
 
 
-def _doubt_tool(dataset: Dataset, camera: CameraFit, misfit: float) -> CameraFit:
-    """Warn where camera and kinematics put the tool in different places."""
-    expected = dataset.config.tool_radius + 0.01
-    if not misfit > expected:
-        return camera
-    doubt = (
-        f"The camera sees the tool {misfit * 1e3:.0f} mm from where the kinematics put its centre, "
-        f"at most {expected * 1e3:.0f} mm is expected: check touches.csv, [camera] to_phantom and "
-        "that both clocks agree."
-    )
-    return replace(camera, warnings=(*camera.warnings, doubt))
-
-
-def _settle_heading(
-    dataset: Dataset, phantom_from_robot: Transform, camera: CameraFit
-) -> CameraFit:
-    """Choose between poses that fit alike, as a plain block's two headings do, by the tool in the
-    clouds.
-
-    A given first guess is not changed; it gets a warning.
-    """
-    fits = (camera, *camera.alternatives)
-    away = tool_misfit(dataset, phantom_from_robot, [fit.phantom_from_camera for fit in fits])
-    best = int(np.argmin(away))
-    others = np.delete(away, best)
-    decided = bool(others.size) and float(others.min() - away[best]) > _DECIDED
-    if not camera.automatic:
-        if decided and best:
-            doubt = (
-                f"The camera sees the tool {away[0] * 1e3:.0f} mm from where the kinematics put "
-                f"it, and {away[best] * 1e3:.0f} mm with the phantom "
-                f"{_turned(camera, fits[best])}: the landmarks in touches.csv or [camera] "
-                "to_phantom are off by that."
-            )
-            return replace(camera, warnings=(*camera.warnings, doubt))
-        return _doubt_tool(dataset, camera, float(away[0]))
-    if not decided:
-        return camera
-    settled = tuple(text for text in camera.warnings if text != camera.ambiguity)
-    return replace(fits[best], automatic=True, warnings=settled)
-
-
-def _turned(camera: CameraFit, other: CameraFit) -> str:
-    """Words on the turn between two poses of the phantom."""
-    motion = other.phantom_from_camera @ camera.phantom_from_camera.inverse()
-    angle = float(np.degrees(np.linalg.norm(motion.rotation_vector)))
-    return "half a turn about z" if angle > 175.0 else f"turned by {angle:.0f} degrees"
+def _rows(places: FloatArray | Sequence[FloatArray]) -> tuple[tuple[float, float, float], ...]:
+    """Rows (n, 3) as tuples."""
+    return tuple((float(x), float(y), float(z)) for x, y, z in places)

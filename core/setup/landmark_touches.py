@@ -1,13 +1,14 @@
-"""The landmark touches that related robot and phantom, and their possible errors."""
+"""The touches and traces that related robot and phantom, and their possible errors."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from palpate.foundation.errors import SetupError
 from palpate.setup.bounds import require_within
 
-__all__ = ["PAIRINGS", "Touching"]
+__all__ = ["PAIRINGS", "Touching", "Tracing"]
 
 PAIRINGS = (
     "as-paired",
@@ -33,7 +34,10 @@ class Touching:
     Attributes:
         misses: (x, y, z) [m] of each touch minus its landmark under the stated registration,
             phantom frame; empty if no touch is off.
-        lift: height of the tool's centre over the landmark at a touch [m].
+        lift: height of the tool's centre over the landmark at a touch [m]; with `normals` the
+            stated radius of the ball, which rests on the surface.
+        normals: outward unit normal at each landmark, along which the ball's centre lies; empty for
+            a lift along z.
         pairing: the true pairing of touches with landmarks, one of PAIRINGS.
         scale: size of the touched polygon over that of the landmarks [1].
         inset: distance of each touch inwards from its landmark, along x and along y [m]: a ball
@@ -43,6 +47,7 @@ class Touching:
 
     misses: tuple[tuple[float, float, float], ...] = ()
     lift: float = 0.0
+    normals: tuple[tuple[float, float, float], ...] = ()
     pairing: str = "as-paired"
     scale: float = 1.0
     inset: float = 0.0
@@ -56,6 +61,18 @@ class Touching:
                 value=self.pairing,
             )
         require_within("touching scale", self.scale, 0.1, 10.0, "")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON, SI units.
+
+        An unknown deviation and normals are left out where there are none: setups stored before
+        there were any have none.
+        """
+        values = {key: value for key, value in vars(self).items() if value not in (None, ())}
+        values["misses"] = [list(miss) for miss in self.misses]
+        if self.normals:
+            values["normals"] = [list(normal) for normal in self.normals]
+        return values
 
     def order(self, count: int) -> list[int]:
         """The landmark, by its row, that each of `count` touches truly belongs to.
@@ -79,3 +96,17 @@ class Touching:
         first, second = (row - 1 for row in rows)
         order[first], order[second] = second, first
         return order
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tracing:
+    """The traces from which phantom_from_robot was computed.
+
+    Attributes:
+        centres: (x, y, z) [m] of the ball on the surface under the stated registration, phantom
+            frame.
+        radius: of the ball, as stated [m].
+    """
+
+    centres: tuple[tuple[float, float, float], ...]
+    radius: float

@@ -16,7 +16,7 @@ from palpate.foundation.frames import Transform
 from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
 from palpate.setup.free_form.shape import Shape
-from palpate.setup.landmark_touches import PAIRINGS, Touching
+from palpate.setup.landmark_touches import PAIRINGS, Touching, Tracing
 from palpate.setup.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
 from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Surface
 
@@ -38,6 +38,7 @@ __all__ = [
     "Support",
     "Tool",
     "Touching",
+    "Tracing",
 ]
 
 Edge = Literal["-x", "+x", "-y", "+y"]
@@ -160,6 +161,7 @@ class Setup:
         landmarks: (x, y, z) [m] of the points whose touches gave phantom_from_robot, on the
             registered block; they sag with it.
         touching: how the landmarks were touched.
+        tracing: the traces by which the robot was registered; None unless it was by traces.
         phantom_from_robot: the stated registration of the robot.
         phantom_from_camera: the stated registration of the camera.
         element_size: edge length of the even grid that replaces any other mesh of a replay [m];
@@ -176,6 +178,7 @@ class Setup:
     registered: Box | Shape | None = None
     landmarks: tuple[tuple[float, float, float], ...] = ()
     touching: Touching = field(default_factory=Touching)
+    tracing: Tracing | None = None
     phantom_from_robot: Transform = field(default_factory=Transform)
     phantom_from_camera: Transform = field(default_factory=Transform)
     element_size: float | None = None
@@ -303,11 +306,8 @@ class Setup:
                 },
             },
             "landmarks": [list(place) for place in self.landmarks],
-            "touching": {
-                # An unknown deviation is left out: setups stored before there was one have none.
-                **{key: value for key, value in vars(self.touching).items() if value is not None},
-                "misses": [list(miss) for miss in self.touching.misses],
-            },
+            "touching": self.touching.as_dict(),
+            **({} if self.tracing is None else {"tracing": vars(self.tracing)}),
             "element_size": self.element_size,
             "mass": self.mass,
             "phantom_from_robot": self.phantom_from_robot.matrix.tolist(),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,6 +14,7 @@ from palpate.foundation.frames import Transform
 from palpate.synthetic.scenario.scenario import Scenario
 
 __all__ = [
+    "Calibration",
     "write_clouds",
     "write_config",
     "write_felt_config",
@@ -18,6 +22,7 @@ __all__ = [
     "write_kinematics",
     "write_ply",
     "write_touches",
+    "write_traces",
 ]
 
 
@@ -73,6 +78,32 @@ def write_touches(path: Path, names: list[str], positions: FloatArray) -> None:
     path.write_text("\n".join(["landmark,x,y,z", *rows]) + "\n")
 
 
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A pose as a calibration gives it.
+
+    Attributes:
+        pose: with an error.
+        position_sigma: standard deviation of each coordinate of its translation [m].
+        rotation_sigma: standard deviation of its rotation about each axis [rad].
+    """
+
+    pose: Transform
+    position_sigma: float
+    rotation_sigma: float
+
+
+def write_traces(path: Path, strokes: list[int], positions: FloatArray) -> None:
+    """Write centres (n, 3) [m], robot frame, of the ball on the untouched surface, one every 0.1
+    s.
+    """
+    rows = [
+        f"{stroke},{0.1 * number:.1f},{x:.7f},{y:.7f},{z:.7f}"
+        for number, (stroke, (x, y, z)) in enumerate(zip(strokes, positions.tolist(), strict=True))
+    ]
+    path.write_text("\n".join(["stroke,t,x,y,z", *rows]) + "\n")
+
+
 def write_config(
     path: Path,
     name: str,
@@ -80,6 +111,7 @@ def write_config(
     landmarks: dict[str, FloatArray],
     guess: Transform | None,
     surface: str = "",
+    calibrated: Mapping[str, Calibration] = MappingProxyType({}),
 ) -> None:
     """Write dataset.toml: the experimenter's beliefs.
 
@@ -90,14 +122,17 @@ def write_config(
         landmarks: (3,) [m] by name.
         guess: first guess of the camera's pose; None without.
         surface: file of a free form's surface; empty for a block.
+        calibrated: poses by their keys, phantom_from_robot and robot_from_camera.
     """
     lines = [
         *_believed(name, scenario, surface, landmarks),
+        *_calibration("[robot]", "phantom_from_robot", calibrated),
         "[camera]",
         'name = "virtual depth camera"',
         "depth_sigma = 0.002",
         *([f"filters = {list(filters)}"] if (filters := scenario.declared_filters) else []),
         *([] if guess is None else [f"to_phantom = [{_rows(guess)}]"]),
+        *_calibration("", "robot_from_camera", calibrated),
         "",
         *_listed(
             {split: list(names) for split, names in scenario.splits.items()}
@@ -105,6 +140,20 @@ def write_config(
         ),
     ]
     path.write_text("\n".join(lines) + "\n")
+
+
+def _calibration(table: str, key: str, calibrated: Mapping[str, Calibration]) -> list[str]:
+    """Lines of a calibrated pose, below the head of its table; none without this pose."""
+    if key not in calibrated:
+        return []
+    one = calibrated[key]
+    return [
+        *([table] if table else []),
+        f"{key} = [{_rows(one.pose)}]",
+        f"position_sigma = {one.position_sigma}",
+        f"rotation_sigma = {one.rotation_sigma}",
+        *([""] if table else []),
+    ]
 
 
 def _rows(pose: Transform) -> str:

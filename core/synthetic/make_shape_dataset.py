@@ -23,12 +23,14 @@ from palpate.synthetic.atomic_write import write_atomically
 from palpate.synthetic.bench.depth_camera import CameraScene, DepthCamera
 from palpate.synthetic.bench.motion_plan import MotionPlan
 from palpate.synthetic.bench.sequence_recording import SequenceJob
+from palpate.synthetic.bench.true_body import true_radius
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.bodies.organ_shape import write_surface
+from palpate.synthetic.bodies.robot_relation import ROBOT_RELATIONS, Bench
 from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
 from palpate.synthetic.bodies.shape_pushes import push_motion, reachable_places, spread_places
-from palpate.synthetic.dataset_writer import write_config, write_ply, write_touches
+from palpate.synthetic.dataset_writer import write_config, write_ply
 from palpate.synthetic.make_dataset import TOUCH_NOISE, draw_camera, draw_camera_shift, record_all
 from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 from palpate.synthetic.scenario.scenario import Scenario
@@ -77,11 +79,13 @@ class ShapeScenario:
         family: of the shape.
         seed: of its proportions.
         scenario: beliefs and hidden effects; its size is the shape's.
+        robot: how robot and phantom are related, one of `ROBOT_RELATIONS`.
     """
 
     family: str
     seed: int
     scenario: Scenario
+    robot: str = "touches"
 
     @cached_property
     def stated(self) -> Shape:
@@ -171,9 +175,18 @@ def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: R
     write_ply(folder / "rest.ply", camera.cloud(scene, rng))
     write_surface(folder / "phantom.stl", drawn.stated.vertices, drawn.stated.triangles)
     marks = _marks(drawn.stated)
-    _write_touches(folder, drawn, marks, robot_from_phantom, (rest, settled), rng)
+    bench = Bench(
+        body=drawn.true,
+        radius=true_radius(scenario),
+        marks=tuple(marks),
+        touched=_touched(drawn, marks, (rest, settled), rng),
+        robot_from_phantom=robot_from_phantom,
+        phantom_from_camera=camera.phantom_from_camera,
+    )
+    relate = ROBOT_RELATIONS[drawn.robot]
+    calibrated = relate(bench, folder, np.random.default_rng([seed, 51]))
     name = f"{drawn.family}-{rng.integers(16**4):04x}"
-    write_config(folder / "dataset.toml", name, scenario, marks, None, "phantom.stl")
+    write_config(folder / "dataset.toml", name, scenario, marks, None, "phantom.stl", calibrated)
     jobs = [
         SequenceJob(
             scenario,
@@ -200,22 +213,19 @@ def _marks(shape: Shape) -> dict[str, FloatArray]:
     return {f"mark_{number}": np.round(place, 5) for number, place in enumerate(chosen, start=1)}
 
 
-def _write_touches(
-    folder: Path,
+def _touched(
     drawn: ShapeScenario,
     marks: dict[str, FloatArray],
-    robot_from_phantom: Transform,
     surface: tuple[FloatArray, FloatArray],
     rng: np.random.Generator,
-) -> None:
-    """Write touches of the marks on the true body, with the error of a careful hand."""
+) -> FloatArray:
+    """Touch the marks (n, 3) [m] on the true body, with the error of a careful hand."""
     scenario, (rest, settled) = drawn.scenario, surface
     factors = np.array(scenario.true_size) / np.array(scenario.size)
     places = np.array(list(marks.values())) * factors
     near = [int(np.linalg.norm(rest - place, axis=1).argmin()) for place in places]
     touched = places + settled[near] + (0.0, 0.0, scenario.touch_offset)
-    touched = touched + rng.normal(size=touched.shape) * TOUCH_NOISE
-    write_touches(folder / "touches.csv", list(marks), robot_from_phantom.apply(touched))
+    return np.asarray(touched + rng.normal(size=touched.shape) * TOUCH_NOISE)
 
 
 def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[MotionPlan]:

@@ -4,7 +4,7 @@ Umeyama's sign (1991).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,6 +35,10 @@ class RobotFit:
             usual error of a touch.
         pivot: (3,) [m] centroid of the landmarks, phantom frame.
         covariance: (6, 6) [m, rad] of a small motion about `pivot` (see palpate.registration.pose).
+        source: key or file that it comes from.
+        summary: how well it fits, for a person.
+        traced: (m, 3) [m] centres of the traced points that fit, phantom frame; empty without.
+        alternatives: other poses that fit alike, as over a symmetric body.
     """
 
     phantom_from_robot: Transform
@@ -43,6 +47,24 @@ class RobotFit:
     sigma: float
     pivot: FloatArray
     covariance: FloatArray
+    source: str = "touches.csv"
+    summary: str = ""
+    traced: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    alternatives: tuple[RobotFit, ...] = ()
+
+    def apart(self, other: RobotFit) -> tuple[FloatArray, FloatArray]:
+        """Compare with another fit.
+
+        Returns:
+            motion (6,) [m, rad] about `pivot` from this pose to the other one, and the covariance
+            (6, 6) that both together state for it.
+        """
+        motion = other.phantom_from_robot @ self.phantom_from_robot.inverse()
+        moved = motion.apply(self.pivot[None])[0] - self.pivot
+        lever = motion_jacobian(self.pivot[None], other.pivot)[0]
+        there = np.vstack([lever, np.eye(6)[3:]])
+        covariance = self.covariance + there @ other.covariance @ there.T
+        return np.concatenate([moved, motion.rotation_vector]), covariance
 
 
 def rigid_fits(
@@ -110,4 +132,5 @@ def fit_robot(touches: FloatArray, landmarks: FloatArray) -> RobotFit:
     pivot = landmarks.mean(axis=0)
     jacobian = motion_jacobian(landmarks, pivot).reshape(-1, 6)
     covariance = np.asarray(sigma**2 * np.linalg.inv(jacobian.T @ jacobian), dtype=float)
-    return RobotFit(fit, residuals, float(rms[0]), sigma, pivot, covariance)
+    summary = f"touches miss their landmarks by {1e3 * rms[0]:.2f} mm RMS"
+    return RobotFit(fit, residuals, float(rms[0]), sigma, pivot, covariance, summary=summary)

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.registration.pose import motion_jacobian, small_motion
+from palpate.registration.shape.even_rotations import even_rotations
 from palpate.registration.shape.seen_body import SeenBody
 from palpate.registration.shape.seen_rays import SeenRays
 
@@ -65,7 +66,7 @@ def find_poses(view: SeenRays, body: SeenBody) -> list[Hypothesis]:
         view: the rest cloud.
         body: as stated.
     """
-    rotations = _headings() if view.table else _all_rotations()
+    rotations = _headings() if view.table else list(even_rotations(_ROTATIONS))
     found = [start for rotation in rotations for start in _starts(view, body, rotation)]
     if len(found) > _PROMISING:
         found = sorted(found, key=lambda one: one.misfit)[:_PROMISING]
@@ -93,18 +94,6 @@ def _headings() -> list[FloatArray]:
     """Rotations (3, 3) about z."""
     angles = np.arange(_HEADINGS) * (2 * np.pi / _HEADINGS)
     return [np.asarray(Rotation.from_euler("z", angle).as_matrix()) for angle in angles]
-
-
-def _all_rotations() -> list[FloatArray]:
-    """Evenly spread rotations (3, 3): super-Fibonacci spirals (Alexa 2022)."""
-    golden, psi = np.sqrt(2.0), 1.533751168755204288118041
-    step = np.arange(_ROTATIONS) + 0.5
-    alpha, beta = 2 * np.pi * step / golden, 2 * np.pi * step / psi
-    low, high = np.sqrt(step / _ROTATIONS), np.sqrt(1 - step / _ROTATIONS)
-    quaternions = np.stack(
-        [low * np.sin(alpha), low * np.cos(alpha), high * np.sin(beta), high * np.cos(beta)], axis=1
-    )
-    return list(Rotation.from_quat(quaternions).as_matrix())
 
 
 def _starts(view: SeenRays, body: SeenBody, rotation: FloatArray) -> list[Hypothesis]:

@@ -1,4 +1,6 @@
-"""The part of a surface that is held: below a plane, or named by triangles or by vertices."""
+"""The part of a surface that is held: below a plane, on a second surface, or named by triangles or
+by vertices.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ import numpy as np
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 
-__all__ = ["Faces", "FixedRegion", "Painted", "Plane"]
+__all__ = ["Faces", "FixedRegion", "NearSurface", "Painted", "Plane"]
 
 
 class FixedRegion(Protocol):
@@ -34,30 +36,69 @@ class FixedRegion(Protocol):
 
 @dataclass(frozen=True)
 class Plane:
-    """All triangles below a horizontal plane: what stands on a table.
+    """All triangles below a plane: what stands on a table, or lies behind any other plane.
 
     Attributes:
-        height: z of the plane [m].
+        height: distance of the plane from the origin along the normal [m].
         tolerance: a triangle may reach so far above the plane [m].
+        normal: unit normal of the plane; up unless stated.
     """
 
     height: float = 0.0
     tolerance: float = 1e-4
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
         """Mark the triangles that are held (t,)."""
-        tops = vertices[triangles, 2].max(axis=1)
+        tops = (vertices @ np.array(self.normal))[triangles].max(axis=1)
         held = tops <= self.height + self.tolerance
         if not held.any():
+            x, y, z = self.normal
+            plane = "z" if z == 1.0 else f"({x:.3g}, {y:.3g}, {z:.3g}) . (x, y, z)"
             raise MeshError(
-                f"{name}: no triangle lies below z = {self.height:g} m within {self.tolerance:g} "
-                "m, "
-                f"the lowest reaches up to {tops.min():.4g} m; expected a base there: "
-                "move the surface, or raise height or tolerance",
+                f"{name}: no triangle lies below {plane} = {self.height:g} m within "
+                f"{self.tolerance:g} m, the lowest reaches up to {tops.min():.4g} m; expected what "
+                "is held there: move the surface, or raise height or tolerance",
                 file=name,
                 height=self.height,
                 tolerance=self.tolerance,
                 lowest=float(tops.min()),
+            )
+        return np.asarray(held)
+
+
+@dataclass(frozen=True, eq=False)
+class NearSurface:
+    """All triangles that lie on a second surface, such as a tray or a bone.
+
+    Attributes:
+        vertices: (v, 3) of the second surface [m].
+        triangles: (t, 3) of it.
+        tolerance: a corner may be so far from it [m].
+        name: of its file, for messages.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    tolerance: float
+    name: str
+
+    def mask(self, name: str, vertices: FloatArray, triangles: IntArray) -> BoolArray:
+        """Mark the triangles that are held (t,)."""
+        from palpate.setup.free_form.closest_point import nearest
+
+        _, places = nearest(np.ascontiguousarray(vertices, float), self.vertices[self.triangles])
+        apart = np.linalg.norm(vertices - places, axis=1)
+        farthest = apart[triangles].max(axis=1)
+        held = farthest <= self.tolerance
+        if not held.any():
+            raise MeshError(
+                f"{name}: no triangle lies within {self.tolerance:g} m of {self.name}, the nearest "
+                f"is {farthest.min():.4g} m away; expected both in one frame and unit: move one of "
+                "them, or raise fixed_tolerance",
+                file=name,
+                tolerance=self.tolerance,
+                lowest=float(farthest.min()),
             )
         return np.asarray(held)
 

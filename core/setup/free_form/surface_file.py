@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 
-__all__ = ["FORMATS", "check_surface", "read_surface"]
+__all__ = ["FORMATS", "check_surface", "read_numbered_surface", "read_surface"]
 
 FORMATS = (".stl", ".ply", ".obj")
 LARGEST_FILE = 2**25
@@ -28,6 +28,14 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
     Args:
         path: the file.
         scale: its unit of length [m].
+    """
+    vertices, triangles, _ = read_numbered_surface(path, scale)
+    return vertices, triangles
+
+
+def read_numbered_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray, IntArray]:
+    """Read a file like `read_surface`; the third result (n,) is the vertex that each of the file's
+    vertices became.
     """
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
@@ -62,16 +70,23 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, IntArray]:
         raise MeshError(
             f"{path.name}: cannot be read as a surface ({error}); export it anew", file=str(path)
         ) from error
-    return merge_vertices(scale * vertices.reshape(-1, 3), triangles.reshape(-1, 3))
+    merged, numbers = _merged(scale * vertices.reshape(-1, 3))
+    return merged, numbers[triangles.reshape(-1, 3)], numbers
 
 
 def merge_vertices(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
     """Merge equal vertices, in the order of their first appearance."""
+    merged, numbers = _merged(vertices)
+    return merged, numbers[triangles]
+
+
+def _merged(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Different vertices in the order of their first appearance, and the number of each vertex."""
     _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return vertices[first[order]], rank[inverse.ravel()][triangles]
+    return vertices[first[order]], rank[inverse.ravel()]
 
 
 def check_surface(name: str, vertices: FloatArray, triangles: IntArray) -> None:

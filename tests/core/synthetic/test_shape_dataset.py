@@ -11,6 +11,7 @@ import pytest
 from palpate.dataset import open_dataset
 from palpate.experiment import Experiment
 from palpate.foundation.errors import EffectError, SetupError
+from palpate.registration.registration import register, setup_from
 from palpate.synthetic import draw_shape_scenario, make_shape_dataset
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
@@ -34,6 +35,36 @@ def test_dataset_is_registered_where_it_was_taken(tmp_path: Path) -> None:
         gap = experiment.dataset.geometry.gap(centres, 5e-3).min()
         assert -8.5e-3 < gap < -3e-3
         assert len(recorded) > 10
+
+
+@pytest.mark.parametrize(
+    ("robot", "source", "within"),
+    [
+        ("traces", "traces.csv", 1.0e-3),
+        ("matrix", "[robot] phantom_from_robot", 2.0e-3),
+        ("hand-eye", "[camera] robot_from_camera", 4.0e-3),
+    ],
+)
+def test_robot_is_registered_without_a_touch(
+    tmp_path: Path, robot: str, source: str, within: float
+) -> None:
+    drawn = draw_shape_scenario("liver", 0, 4)
+    scenario = replace(drawn.scenario, sequences=("poke-top-01",), rate=0.5)
+    drawn = replace(drawn, scenario=scenario, robot=robot)
+    truth = make_shape_dataset(tmp_path / "liver", drawn, 4)
+    assert not (tmp_path / "liver" / "touches.csv").exists()
+    dataset = open_dataset(tmp_path / "liver")
+    found = register(dataset)
+    assert found.robot is not None and found.robot.source == source
+    places = dataset.geometry.surface_points()
+    there = found.phantom_from_robot @ truth.phantom_from_robot.inverse()
+    assert np.linalg.norm(there.apply(places) - places, axis=1).mean() < within
+    off = np.concatenate(
+        [there.apply(found.robot_pivot[None])[0] - found.robot_pivot, there.rotation_vector]
+    )
+    assert off @ np.linalg.solve(found.robot_covariance, off) < 22.0  # 6 expected
+    setup = setup_from(dataset, found)
+    assert (setup.tracing is not None) == (robot == "traces") and not setup.landmarks
 
 
 def test_rest_surface_is_the_body_s_own() -> None:

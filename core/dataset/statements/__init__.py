@@ -1,0 +1,1 @@
+"""Statements of dataset.toml, table by table, with checked values."""
