@@ -55,6 +55,11 @@ def stumble(request: Request, report: Report) -> Request:
     raise ZeroDivisionError("a bug")
 
 
+def lose(request: Request, report: Report) -> Request:
+    """Meet the end of a process of its own, as a write to it does."""
+    raise BrokenPipeError(32, "Broken pipe")
+
+
 def give_up(request: Request, report: Report) -> Request:
     """Raise Cancelled."""
     raise Cancelled
@@ -98,7 +103,7 @@ def die(request: Request, report: Report) -> Request:
 
 TARGETS = {
     work.__name__: f"job_functions:{work.__name__}"
-    for work in (count, sleep_with_child, refuse, stumble, give_up, warn, litter, die)
+    for work in (count, sleep_with_child, refuse, stumble, lose, give_up, warn, litter, die)
 }
 
 

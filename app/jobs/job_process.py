@@ -10,17 +10,22 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterable
+from concurrent.futures import BrokenExecutor
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from typing import Any
 
 from palpate.app.http_errors import NoSpace, as_dict, disk_is_full
-from palpate.foundation.errors import Cancelled, PalpateError
+from palpate.foundation.errors import Cancelled, PalpateError, RunError
 from palpate.foundation.progress import Report
 
 __all__ = ["Work", "context", "stop_group", "work"]
 
+_LOST = (
+    "a process that this job had started was ended from outside (killed, or out of memory): retry "
+    "the job"
+)
 Work = Callable[[dict[str, Any], Report], dict[str, Any]]
 log = logging.getLogger(__name__)
 
@@ -92,6 +97,9 @@ def _outcome(target: str, request: dict[str, Any], report: Report) -> tuple[str,
     except Exception as error:
         if disk_is_full(error):
             return "failed", as_dict(NoSpace())
+        if isinstance(error, (ConnectionError, EOFError, BrokenExecutor)):
+            log.exception("job %s lost a process", target)
+            return "failed", as_dict(RunError(_LOST))
         log.exception("job %s stopped", target)
         return "failed", {
             "kind": "InternalError",

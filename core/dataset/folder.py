@@ -16,7 +16,7 @@ from palpate.dataset.schema import DatasetConfig, read_config
 from palpate.dataset.sequence import Sequence, read_sequence
 from palpate.dataset.shape_from_file import read_shape
 from palpate.dataset.statements.checked_keys import FILE, nearest
-from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.setup.setup import Box, Shape
@@ -46,7 +46,6 @@ class Dataset:
         loaded: the sequences, sorted by name.
         geometry: stated geometry of the phantom.
         traces: of the tool over the untouched surface.
-        holders: vertices (v, 3) [m], phantom frame, and triangles (t, 3) of rigid things in view.
         accepted: registration of the camera in place of the automatic one; None without.
     """
 
@@ -57,7 +56,6 @@ class Dataset:
     loaded: tuple[Sequence, ...]
     geometry: Box | Shape
     traces: Traces = field(default_factory=Traces)
-    holders: tuple[tuple[FloatArray, IntArray], ...] = ()
     accepted: AcceptedRegistration | None = None
 
     @property
@@ -138,7 +136,7 @@ def open_dataset(path: Path | str) -> Dataset:
     """
     root = Path(path)
     check_folder(root)
-    config, geometry, holders = stated(root)
+    config, geometry = stated(root)
     touches, traces = read_touches(root, config), read_traces(root)
     sequences = tuple(read_sequence(root, name) for name in sequence_names(root))
     check_splits(config, [sequence.name for sequence in sequences])
@@ -152,21 +150,16 @@ def open_dataset(path: Path | str) -> Dataset:
     has_rest = observed or (root / "rest.ply").exists()
     if has_rest:
         read_header(root, "rest.ply")
-    return Dataset(root, config, touches, has_rest, sequences, geometry, traces, holders)
+    return Dataset(root, config, touches, has_rest, sequences, geometry, traces)
 
 
-def stated(
-    root: Path,
-) -> tuple[DatasetConfig, Box | Shape, tuple[tuple[FloatArray, IntArray], ...]]:
-    """Read dataset.toml, the phantom's geometry, and the surfaces of what holds it; see
-    `Dataset.holders`.
-    """
+def stated(root: Path) -> tuple[DatasetConfig, Box | Shape]:
+    """Read dataset.toml and the phantom's geometry."""
     config = read_config(root)
     if config.shape is None:
-        return config, Box(size=config.size), ()
+        return config, Box(size=config.size)
     found = read_shape(root, config.shape)
-    config = config.in_phantom_frame(found.shape.size, found.phantom_from_file)
-    return config, found.shape, found.holders
+    return config.in_phantom_frame(found.shape.size, found.phantom_from_file), found.shape
 
 
 def check_folder(root: Path) -> None:

@@ -31,14 +31,12 @@ class StatedShape:
     """A phantom of any shape, in the phantom frame: z up, the lowest point near z = 0.
 
     Attributes:
-        shape: the body.
-        holders: vertices (v, 3) [m] and triangles (t, 3) of each rigid thing in view.
+        shape: the body, with the rigid things in view.
         phantom_from_file: to the phantom frame from the frame of the files; the identity if up is z
             and the lowest point lies near z = 0.
     """
 
     shape: Shape
-    holders: tuple[tuple[FloatArray, IntArray], ...]
     phantom_from_file: Transform
 
 
@@ -52,16 +50,16 @@ def read_shape(root: Path, stated: ShapeStatement) -> StatedShape:
         _check_units(file, vertices, stated.unit)
     turn = _upright(vertices, stated)
     body = turn.apply(vertices)
-    try:
-        fixed = _HELD[stated.held_by](root, stated, turn, body, numbers)
-        shape = Shape(body, triangles, fixed, Path(file).name)
-    except MeshError as error:
-        raise problem(file, error.message.removeprefix(f"{Path(file).name}: ")) from error
-    holders = []
+    in_view = []
     for holder in stated.holders:
         points, faces, _ = _read(root, holder, stated.unit)
-        holders.append((turn.apply(points), faces))
-    return StatedShape(shape, tuple(holders), turn)
+        in_view.append((turn.apply(points), faces))
+    try:
+        fixed = _HELD[stated.held_by](root, stated, turn, body, numbers)
+        shape = Shape(body, triangles, fixed, Path(file).name, tuple(in_view))
+    except MeshError as error:
+        raise problem(file, error.message.removeprefix(f"{Path(file).name}: ")) from error
+    return StatedShape(shape, turn)
 
 
 def _read(root: Path, file: str, unit: float) -> tuple[FloatArray, IntArray, IntArray]:

@@ -22,6 +22,7 @@ from palpate.measurement.hole_rims import beside_holes
 from palpate.measurement.tool_pose import SHAFT_LENGTH, ShaftSight, ToolPose, locate_tool
 from palpate.registration.camera.table_plane import find_table
 from palpate.registration.registration import Registration
+from palpate.registration.shape.seen_body import SeenBody
 from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["REASONS", "CleanCloud", "Cleaner", "cleaner_for"]
@@ -29,7 +30,7 @@ __all__ = ["REASONS", "CleanCloud", "Cleaner", "cleaner_for"]
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-REASONS = ("kept", "table", "tool", "shaft", "background", "stray", "hole")
+REASONS = ("kept", "table", "tool", "shaft", "background", "stray", "hole", "holder")
 """Labels of points: the phantom's ("kept"), and why others are removed."""
 SIGMAS = 3.0
 """Standard deviations of noise that the tests allow for [1]."""
@@ -111,9 +112,12 @@ class Cleaner:
         on_table = np.abs(height) < thickness
         reason[height < thickness] = REASONS.index("background")
         reason[on_table] = REASONS.index("table")
+        reason[self._on_holder(points)] = REASONS.index("holder")
         if tool is not None:
             camera = self.phantom_from_camera.translation
-            near = np.flatnonzero(reason != REASONS.index("table"))
+            near = np.flatnonzero(
+                (reason != REASONS.index("table")) & (reason != REASONS.index("holder"))
+            )
             located = locate_tool(points[near], apart[near], tool, camera, self._slack)
             is_tool, is_shaft = self._tool_points(points[near], located)
             is_tool |= self._beside_tool(points[near], apart[near], located)
@@ -132,11 +136,26 @@ class Cleaner:
             {name: int(count) for name, count in zip(REASONS, counts, strict=True)},
         )
 
+    def _on_holder(self, points: FloatArray) -> Mask:
+        """Mask (n,) of points (n, 3) [m], phantom frame, whose line of sight ends on a rigid thing
+        in front of the undeformed phantom.
+
+        The line of sight alone decides, not the noisy depth, so that what is kept has no bias.
+        """
+        if not self.geometry.in_view:
+            return np.zeros(len(points), dtype=bool)
+        hits = SeenBody(self.geometry).cast(*self._sights(points))
+        return hits.hidden
+
+    def _sights(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The camera's centre (3,) [m] and unit vectors (n, 3) to points (n, 3) [m]."""
+        camera = self.phantom_from_camera.translation
+        ways = points - camera
+        return camera, ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
+
     def _beside_holes(self, points: FloatArray, asked: Mask) -> Mask:
         """Mask (n,) of the asked points (n, 3) [m], phantom frame, at the rim of holes."""
-        sights = points - self.phantom_from_camera.translation
-        lengths = np.linalg.norm(sights, axis=1, keepdims=True)
-        return beside_holes(sights / np.maximum(lengths, 1e-9), asked)
+        return beside_holes(self._sights(points)[1], asked)
 
     @property
     def lowest(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["CLEARANCE", "LEAST_EDGE", "PATCH", "SPACING", "Geometry", "Surface"]
+__all__ = ["CLEARANCE", "LEAST_EDGE", "PATCH", "SPACING", "Geometry", "Solid", "Surface"]
 
 CLEARANCE = 1.5e-3
 """A tool farther than this from the stated phantom [m] does not touch it, even if size or pose are
@@ -21,6 +21,10 @@ SPACING, PATCH = 1.5e-3, 4e-3
 LEAST_EDGE = 1.5e-3
 """Distance to an edge below which points are left out [m], whatever is declared: depth cameras
 round edges."""
+
+
+Solid = tuple[FloatArray, IntArray]
+"""Vertices (v, 3) [m] and triangles (t, 3) of a rigid thing, phantom frame."""
 
 
 class Geometry(ABC):
@@ -51,6 +55,11 @@ class Geometry(ABC):
     def is_block(self) -> bool:
         """Whether top and sides are the five free faces of a block along the axes."""
         return False
+
+    @property
+    def in_view(self) -> tuple[Solid, ...]:
+        """Rigid things around the body, such as a tray, that a camera may see."""
+        return ()
 
     @property
     @abstractmethod

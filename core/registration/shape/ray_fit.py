@@ -59,9 +59,9 @@ def on_surface(
     on_body = _Part(hits.met, length - hits.distance, hits.normal, BODY)
     parts = [on_body]
     if table:
-        parts.append(_table(body, camera, ways, length, hits.met))
+        parts.append(_table(body, camera, ways, length, hits.met | hits.hidden))
     found = [part.assignment(points, ways, body, gate) for part in parts]
-    beside = ~hits.met
+    beside = ~hits.met & ~hits.hidden
     if table:  # lower points may be the table's
         beside &= points[:, 2] > gate
     return joined([*found, _beside(points, body, np.flatnonzero(beside), gate)])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.foundation.arrays import BoolArray, FloatArray
+from palpate.setup.free_form.solids_in_view import distances_along
 from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["Hits", "SeenBody"]
@@ -22,15 +23,22 @@ class Hits:
         distance: (n,) from the rays' origin [m]; infinite where a ray misses, or meets the surface
             from inside.
         normal: (n, 3) outward normals; zero where a ray misses.
+        blocked: (n,) distance [m] to a rigid thing in front of the body; infinite without one.
     """
 
     distance: FloatArray
     normal: FloatArray
+    blocked: FloatArray
 
     @property
     def met(self) -> BoolArray:
         """Whether each ray meets the surface (n,)."""
         return np.isfinite(self.distance)
+
+    @property
+    def hidden(self) -> BoolArray:
+        """Whether each ray ends on a rigid thing in front of the body (n,)."""
+        return np.isfinite(self.blocked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +76,13 @@ class SeenBody:
         """Half the diagonal of the body's bounds [m]."""
         return float(np.linalg.norm(self.geometry.high - self.geometry.low)) / 2
 
+    @cached_property
+    def reach_in_view(self) -> float:
+        """Largest distance [m] from the body's middle of what is seen of it and around it."""
+        around = [vertices for vertices, _ in self.geometry.in_view]
+        far = [np.linalg.norm(vertices - self.middle, axis=1).max() for vertices in around]
+        return float(max([self.reach, *far]))
+
     def cast(self, origin: FloatArray, ways: FloatArray) -> Hits:
         """Cast rays.
 
@@ -78,14 +93,17 @@ class SeenBody:
         import open3d as o3d
 
         scene, normals = self._scene
-        lines = np.hstack([np.broadcast_to(origin, ways.shape), ways]).astype(np.float32)
-        found = scene.cast_rays(o3d.core.Tensor.from_numpy(lines))
+        lines = np.hstack([np.broadcast_to(origin, ways.shape), ways])
+        found = scene.cast_rays(o3d.core.Tensor.from_numpy(lines.astype(np.float32)))
         distance = found["t_hit"].numpy().astype(float)
         normal, met = np.zeros(ways.shape), np.isfinite(distance)
         normal[met] = normals[found["primitive_ids"].numpy()[met].astype(np.int64)]
         behind = np.einsum("ni,ni->n", normal, ways) > 0
         distance[behind], normal[behind] = np.inf, 0.0
-        return Hits(distance, normal)
+        blocked = distances_along(self.geometry.in_view, lines)
+        hidden = blocked < distance
+        distance[hidden], normal[hidden] = np.inf, 0.0
+        return Hits(distance, normal, np.where(hidden, blocked, np.inf))
 
     def nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points of the free surface nearest to points (n, 3) [m], and its normals there (n, 3)."""

@@ -75,7 +75,7 @@ class SeenRays:
                 "to_phantom"
             )
         middle = np.median(points[candidate], axis=0)
-        around = np.linalg.norm(points - middle, axis=1) < 2.5 * body.reach
+        around = np.linalg.norm(points - middle, axis=1) < 2.5 * body.reach_in_view
         random = np.random.default_rng(0)
         own = random.permutation(np.flatnonzero(candidate))[:_MOST_OWN]
         others = random.permutation(np.flatnonzero(around & ~candidate))[:_MOST_OTHERS]
@@ -140,7 +140,8 @@ class SeenRays:
         ways = ends - origin
         length = np.linalg.norm(ways, axis=1)
         ways /= length[:, None]
-        expected = body.cast(origin, ways).distance
+        hits = body.cast(origin, ways)
+        expected = np.minimum(hits.distance, hits.blocked)
         if self.table:
             with np.errstate(divide="ignore"):
                 floor = np.where(ways[:, 2] < 0, -origin[2] / ways[:, 2], np.inf)
@@ -175,7 +176,7 @@ def _candidates(points: FloatArray, body: SeenBody, noise: float, *, table: bool
         part = points[rows[labels == number]]
         low, high = np.percentile(part, [1, 99], axis=0)
         from_middle = np.linalg.norm(part - 0.5 * (low + high), axis=1)
-        if np.percentile(from_middle, 99) < _LARGEST * body.reach + noise:
+        if np.percentile(from_middle, 99) < _LARGEST * body.reach_in_view + noise:
             result[rows[labels == number]] = True
             return result
     return result

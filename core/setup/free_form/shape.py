@@ -16,7 +16,7 @@ from palpate.setup.free_form.fixed_region import Faces, FixedRegion, Plane
 from palpate.setup.free_form.shape_surface import ShapeSurface
 from palpate.setup.free_form.stretched_surface import StretchedSurface
 from palpate.setup.free_form.surface_file import check_surface, read_surface
-from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry, Surface
+from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Geometry, Solid, Surface
 
 __all__ = ["Shape", "load_shape"]
 
@@ -36,12 +36,14 @@ class Shape(Geometry):
         triangles: (t, 3), counter-clockwise from outside.
         fixed: the part that is held.
         name: of the file, for messages.
+        in_view: rigid things around the body, see `Geometry.in_view`.
     """
 
     vertices: FloatArray
     triangles: IntArray
     fixed: FixedRegion = field(default_factory=Plane)
     name: str = "surface"
+    in_view: tuple[Solid, ...] = ()
 
     def __post_init__(self) -> None:
         check_surface(self.name, self.vertices, self.triangles)
@@ -208,7 +210,8 @@ class Shape(Geometry):
 @lru_cache(maxsize=32)
 def _scaled(shape: Shape, factors: tuple[float, float, float]) -> Shape:
     fixed = Faces.of(np.flatnonzero(shape.held))
-    return Shape(shape.vertices * factors, shape.triangles, fixed, shape.name)
+    body = shape.vertices * factors
+    return Shape(body, shape.triangles, fixed, shape.name, shape.in_view)
 
 
 @lru_cache(maxsize=8)

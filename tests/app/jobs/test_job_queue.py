@@ -15,6 +15,11 @@ from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import JobState
 from palpate.app.storage.result_store import NAME
 
+_LOST = (
+    "a process that this job had started was ended from outside (killed, or out of memory): retry "
+    "the job"
+)
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -92,6 +97,7 @@ def test_failed_job_keeps_its_error_with_its_place(jobs: JobQueue, folder: Path)
     ("kind", "error"),
     [
         ("stumble", "InternalError: ZeroDivisionError: a bug"),
+        ("lose", "RunError: " + _LOST),
         ("die", "WorkerDied: the worker process ended with code 7"),
     ],
 )

@@ -110,7 +110,7 @@ def test_things_in_view_are_read_with_the_phantom(tmp_path: Path) -> None:
         open_dataset(root)
     corners = np.array([[0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [0.1, 0.1, 0.0]])
     write_surface(root / "tray.stl", corners, np.array([[0, 1, 2]]))
-    ((vertices, faces),) = open_dataset(root).holders
+    ((vertices, faces),) = open_dataset(root).geometry.in_view
     np.testing.assert_allclose(vertices, corners, atol=1e-7)
     assert faces.shape == (1, 3)
 

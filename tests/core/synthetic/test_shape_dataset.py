@@ -57,7 +57,7 @@ def test_robot_is_registered_without_a_touch(
     found = register(dataset)
     assert found.robot is not None and found.robot.source == source
     places = dataset.geometry.surface_points()
-    there = found.phantom_from_robot @ truth.phantom_from_robot.inverse()
+    there = found.phantom_from_robot @ truth.robot_from_phantom
     assert np.linalg.norm(there.apply(places) - places, axis=1).mean() < within
     off = np.concatenate(
         [there.apply(found.robot_pivot[None])[0] - found.robot_pivot, there.rotation_vector]
