@@ -11,7 +11,7 @@ from palpate.diagnosis.inference.effect_derivative import prior_deviation
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.screening import Candidate
 from palpate.diagnosis.search.signatures import Signature
 from palpate.effects import Effect, Linearisation, NuisanceBlock, Tangent
@@ -120,21 +120,16 @@ def _tangent_candidates(model: Model) -> list[Candidate]:
 
 
 def _inclusion_candidates(problem: InferenceProblem, model: Model) -> list[Candidate]:
-    """Return the effects that are linearised by local stiffness, at each place of the grid."""
-    places = list(zip(model.layout.inclusions, inclusion_places(problem), strict=True))
+    """Return the effects that are linearised by local stiffness, at each of their places."""
     found = []
-    for kind in problem.applicable:
-        if kind.linearisation is Linearisation.LOCAL_STIFFNESS:
-            for column, place in places:
-                tangent = Tangent(
-                    effect=kind.placed(place), of=kind.amplitude, deviation=kind.amplitude_deviation
-                )
-                found.append(
-                    Candidate(
-                        start=tangent.effect,
-                        of=(tangent.of,),
-                        columns=(column,),
-                        spread=(prior_deviation(tangent),),
-                    )
-                )
+    for effect, number in screened_inclusions(problem).effects:
+        tangent = Tangent(effect=effect, of=effect.amplitude, deviation=effect.amplitude_deviation)
+        found.append(
+            Candidate(
+                start=effect,
+                of=(tangent.of,),
+                columns=(model.layout.inclusions[number],),
+                spread=(prior_deviation(tangent),),
+            )
+        )
     return found

@@ -21,7 +21,7 @@ from palpate.diagnosis.search.candidates import tangents_of
 from palpate.diagnosis.search.chance_gains import ChanceGains
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.required_gain import (
     gain_to_try,
@@ -60,8 +60,9 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
     known = known_mismatch(problem.catalogue, problem.setup, problem.grid, repair)
     names = [effect.name for effect in known]
     tangents = tangents_of(problem.applicable, with_effects(problem.setup, known), names)
+    inclusions = screened_inclusions(problem)
     began = time.monotonic()
-    origin = evaluator.baseline(tangents, inclusion_places(problem), known)
+    origin = evaluator.baseline(tangents, inclusions.lumps, known, inclusions.spots)
     evaluator.expect(CRITERIA.screening.search_over_baseline * (time.monotonic() - began))
     baseline = evaluator.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=evaluator.misfit(baseline), known=known)

@@ -12,7 +12,7 @@ from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.posterior import Posterior
 from palpate.diagnosis.search.screening import Candidate
-from palpate.effects import Effect
+from palpate.effects import Effect, Linearisation
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["beyond_first_order", "shortlist"]
@@ -52,6 +52,8 @@ def shortlist(
 ) -> list[Candidate]:
     """Return the best start of each promising effect, best first; of an inclusion two places.
 
+    Inclusions of all shapes take the place of one effect.
+
     Args:
         gains: linear gain (c,) of each candidate [nats].
         candidates: of the screening.
@@ -70,9 +72,17 @@ def shortlist(
         room = (not taken and candidate.refitted) or (
             candidate.start.inclusion is not None and len(taken) < 2 and apart
         )
-        if enough[number] and room and (taken or len({c.start.name for c in chosen}) < names):
+        kinds = {_kind(one) for one in chosen}
+        if enough[number] and room and (_kind(candidate) in kinds or len(kinds) < names):
             chosen.append(candidate)
     return chosen
+
+
+def _kind(candidate: Candidate) -> str:
+    """Return the name of a candidate's effect, or the linearisation that inclusions share."""
+    start = candidate.start
+    alike = start.linearisation is Linearisation.LOCAL_STIFFNESS
+    return start.linearisation.value if alike else start.name
 
 
 def _distance(one: Effect, other: Effect) -> float:

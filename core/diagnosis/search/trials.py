@@ -23,13 +23,13 @@ from palpate.diagnosis.inference.gauss_newton import refit, worth_while
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.search.candidates import candidates_of, tangents_of
 from palpate.diagnosis.search.findings import Trial
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides
 from palpate.diagnosis.search.signatures import Signature, updated_signatures
 from palpate.effects import Effect, Tangent
 from palpate.effects.base import with_effects
 from palpate.foundation.arrays import FloatArray
-from palpate.setup.setup import Inclusion
+from palpate.setup.setup import AnyInclusion
 
 __all__ = [
     "HeldHistory",
@@ -71,10 +71,10 @@ def screen_again(
     """Screen the catalogue on top of a model that has causes; arguments as for `screen`."""
     problem = evaluator.problem
     tangents = tangents_of(problem.applicable, model.setup, model.names)
-    places = inclusion_places(problem)
-    extended = evaluator.evaluate(model.effects, model.predictions, tangents, places)
+    lumps = screened_inclusions(problem).lumps
+    extended = evaluator.evaluate(model.effects, model.predictions, tangents, lumps)
     if model.has_history:  # beside its replayed columns, those of another cause promise less
-        extended = with_columns_of(evaluator, extended, model, model.columns, len(places))
+        extended = with_columns_of(evaluator, extended, model, model.columns, len(lumps))
     updated = updated_signatures(evaluator, extended, signatures, origin)
     return screen(evaluator, extended, updated, origin)
 
@@ -157,7 +157,7 @@ class HeldHistory(SharedEvaluator):
         effects: Sequence[Effect],
         starts: Sequence[Prediction] | None = None,
         tangents: Sequence[Tangent] = (),
-        inclusions: Sequence[Inclusion] = (),
+        inclusions: Sequence[AnyInclusion] = (),
     ) -> Model:
         """Replay the effects without history, and add the change by those with history.
 
