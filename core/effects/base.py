@@ -224,6 +224,13 @@ class Effect(ABC):
         return [(cls.placed(place), place) for place in places]
 
     @classmethod
+    def around(cls, found: Inclusion, setup: Setup) -> Sequence[tuple[Self, AnyInclusion]]:
+        """Return neutral effects of another shape that may be there where a ball was fitted, each
+        with the part of the body whose stiffness it changes; none by default.
+        """
+        return []
+
+    @classmethod
     def of_touches(cls, pairing: str) -> Self | None:
         """Return the effect of touching the landmarks in this order; None for most effects."""
         return None

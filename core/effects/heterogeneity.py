@@ -27,10 +27,13 @@ _SCREENED_LIMIT = 6.0
 correlation of 0.99 with replays of J_m 1 and 3."""
 _HEADINGS = (0.0, math.pi / 4, math.pi / 2, -math.pi / 4)
 """Directions in which tubes are screened [rad]."""
-_TUBES_APART = 7e-3
+_TUBES_APART = 12e-3
 """Distance of tubes of one direction that are screened [m], at least."""
 _SCREENED_RADIUS = 4e-3
 """Radius of the tubes that are screened [m]."""
+_TURNS, _SLIMMER = 8, 0.6
+"""Directions of the tubes that are tried through a ball that was fitted, and their radius over its
+own [1]: as long as pushes reach, they are about as strong."""
 _BEYOND = 1e-2
 """Length by which a tube's axis goes on outside the body [m]."""
 _PIECES, _REPORTED = 16, 17
@@ -269,6 +272,23 @@ class StiffTube(Effect):
                     beside.append(replace(neutral, aside=aside, z=place.z, heading=heading))
             found += beside
         return [(tube, tube.lump(setup)) for tube in found]
+
+    @classmethod
+    def around(cls, found: Inclusion, setup: Setup) -> Sequence[tuple[Self, Tube]]:
+        """Return level tubes through the middle of a ball, in all directions."""
+        away = np.array([found.x, found.y]) - _middle(setup)
+        radius = next(item for item in cls.numbers() if item.name == "radius")
+        tubes = [
+            replace(
+                cls.neutral(setup),
+                aside=float(away @ [-math.sin(heading), math.cos(heading)]),
+                z=found.z,
+                heading=heading,
+                radius=radius.bounded(_SLIMMER * found.radius),
+            )
+            for heading in (np.arange(_TURNS) * math.pi / _TURNS - math.pi / 2).tolist()
+        ]
+        return [(tube, tube.lump(setup)) for tube in tubes]
 
     def lump(self, setup: Setup) -> Tube:
         """Return the tube with its axis from side to side of the bounding box, and a little on."""

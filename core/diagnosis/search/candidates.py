@@ -17,7 +17,7 @@ from palpate.diagnosis.search.signatures import Signature
 from palpate.effects import Effect, Linearisation, NuisanceBlock, Tangent
 from palpate.setup.setup import Setup
 
-__all__ = ["candidates_of", "mesh_candidates", "tangents_of"]
+__all__ = ["candidates_of", "local_candidate", "mesh_candidates", "tangents_of"]
 
 
 def tangents_of(
@@ -119,17 +119,17 @@ def _tangent_candidates(model: Model) -> list[Candidate]:
     ]
 
 
+def local_candidate(effect: Effect, column: int) -> Candidate:
+    """Return a neutral effect that is linearised by local stiffness, with its column."""
+    tangent = Tangent(effect=effect, of=effect.amplitude, deviation=effect.amplitude_deviation)
+    return Candidate(
+        start=effect, of=(tangent.of,), columns=(column,), spread=(prior_deviation(tangent),)
+    )
+
+
 def _inclusion_candidates(problem: InferenceProblem, model: Model) -> list[Candidate]:
     """Return the effects that are linearised by local stiffness, at each of their places."""
-    found = []
-    for effect, number in screened_inclusions(problem).effects:
-        tangent = Tangent(effect=effect, of=effect.amplitude, deviation=effect.amplitude_deviation)
-        found.append(
-            Candidate(
-                start=effect,
-                of=(tangent.of,),
-                columns=(model.layout.inclusions[number],),
-                spread=(prior_deviation(tangent),),
-            )
-        )
-    return found
+    return [
+        local_candidate(effect, model.layout.inclusions[number])
+        for effect, number in screened_inclusions(problem).effects
+    ]

@@ -52,7 +52,8 @@ def shortlist(
 ) -> list[Candidate]:
     """Return the best start of each promising effect, best first; of an inclusion two places.
 
-    Inclusions of all shapes take the place of one effect.
+    Inclusions of all shapes take the place of one effect. One of another shape than a ball is left
+    out behind a ball: it has better starts once the ball is fitted.
 
     Args:
         gains: linear gain (c,) of each candidate [nats].
@@ -69,11 +70,12 @@ def shortlist(
             _distance(candidate.start, other.start) > CRITERIA.screening.inclusions_apart
             for other in taken
         )
-        room = (not taken and candidate.refitted) or (
-            candidate.start.inclusion is not None and len(taken) < 2 and apart
+        kinds, ball = {_kind(c) for c in chosen}, candidate.start.inclusion is not None
+        alone = _kind(candidate) not in kinds
+        room = (not taken and candidate.refitted and (alone or ball)) or (
+            ball and len(taken) < 2 and apart
         )
-        kinds = {_kind(one) for one in chosen}
-        if enough[number] and room and (_kind(candidate) in kinds or len(kinds) < names):
+        if enough[number] and room and (not alone or len(kinds) < names):
             chosen.append(candidate)
     return chosen
 

@@ -21,9 +21,10 @@ from palpate.diagnosis.inference.evidence import predictive_gain
 from palpate.diagnosis.inference.final_fit import settle, with_columns_of
 from palpate.diagnosis.inference.gauss_newton import refit, worth_while
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.search.candidates import candidates_of, tangents_of
+from palpate.diagnosis.search.candidates import candidates_of, local_candidate, tangents_of
 from palpate.diagnosis.search.findings import Trial
 from palpate.diagnosis.search.inclusion_grid import screened_inclusions
+from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides
 from palpate.diagnosis.search.signatures import Signature, updated_signatures
 from palpate.effects import Effect, Tangent
@@ -38,6 +39,7 @@ __all__ = [
     "screen",
     "screen_again",
     "settled_trials",
+    "starts_around",
     "trial_of",
 ]
 
@@ -107,6 +109,47 @@ def trial_of(
         effects = model.effects
     model = refit(evaluator, effects, starts, hopeless)
     return Trial(model, gain_over(evaluator, model, against), evaluator.misfit(model))
+
+
+def starts_around(evaluator: Evaluator, trials: Sequence[Trial], current: Model) -> list[Effect]:
+    """Return the best start of each effect of another shape than the best ball, where that lies.
+
+    Screened on a grid, a thin tube is seldom where the true one is. But a ball that is fitted to a
+    tube lies on it, about as deep.
+
+    Args:
+        evaluator: of the inference problem.
+        trials: of a further cause each.
+        current: model that they extend.
+    """
+    best = max((trial.gain for trial in trials), default=0.0)
+    balls = [trial for trial in trials if trial.model.effects[-1].inclusion is not None]
+    chosen = max(balls, key=lambda trial: trial.gain, default=None)
+    if chosen is None or chosen.gain < CRITERIA.screening.other_shapes * best:
+        return []
+    problem, ball = evaluator.problem, chosen.model.effects[-1].inclusion
+    assert ball is not None
+    rows = [
+        row
+        for kind in problem.applicable
+        if kind.name not in current.names
+        for row in kind.around(ball, problem.setup)
+    ]
+    if not rows:
+        return []
+    lumps = [lump for _, lump in rows]
+    model = evaluator.evaluate(current.effects, current.predictions, (), lumps)
+    pairs = zip(rows, model.layout.inclusions, strict=True)
+    candidates = [local_candidate(effect, column) for (effect, _), column in pairs]
+    blocks, nuisance = evaluator.tempered(model), (*model.nuisance, *model.columns)
+    known = evaluator.bounded_precision(model)
+    gains = linear_gains(blocks, right_sides(blocks), nuisance, known, candidates)[0]
+    first: dict[str, Effect] = {}
+    for number in np.argsort(-gains):
+        candidate = candidates[number]
+        if candidate.start.name not in first:
+            first[candidate.start.name] = initial_guess(candidate, model, evaluator)
+    return list(first.values())
 
 
 def settled_trials(
