@@ -241,7 +241,7 @@ def swept(axis: FloatArray, radius: float, around: int = 20) -> tuple[FloatArray
     across = np.cross(along, least)
     across /= np.linalg.norm(across, axis=1)[:, None]
     turn = np.linspace(0, 2 * np.pi, around + 1)[:, None]
-    rings = np.cos(turn) * across[:, None] + np.sin(turn) * np.cross(along, across)[:, None]
+    rings = np.cos(turn) * across[:, None] - np.sin(turn) * np.cross(along, across)[:, None]
     rings = axis[:, None] + radius * rings
     ends = [np.broadcast_to(end, (1, *rings.shape[1:])) for end in (axis[0], axis[-1])]
     rows = np.concatenate([ends[0], rings, ends[1]])

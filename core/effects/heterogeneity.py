@@ -31,7 +31,7 @@ _TUBES_APART = 12e-3
 """Distance of tubes of one direction that are screened [m], at least."""
 _SCREENED_RADIUS = 4e-3
 """Radius of the tubes that are screened [m]."""
-_TURNS, _SLIMMER = 8, 0.6
+_TURNS, _SLIMMER = 8, 0.5
 """Directions of the tubes that are tried through a ball that was fitted, and their radius over its
 own [1]: as long as pushes reach, they are about as strong."""
 _BEYOND = 1e-2
@@ -230,8 +230,8 @@ class StiffTube(Effect):
     z: float = parameter("m", low=-0.1, high=0.5, scale=3e-3, accuracy=5e-4)
     heading: float = parameter("rad", low=-math.pi, high=math.pi, scale=0.15, periodic=True)
     inclination: float = parameter("rad", low=-1.0, high=1.0, scale=0.1)
-    bend: float = parameter("1/m", low=-20.0, high=20.0, scale=2.0)
-    sag: float = parameter("1/m", low=-20.0, high=20.0, scale=2.0)
+    bend: float = parameter("1/m", low=-12.0, high=12.0, scale=1.0)
+    sag: float = parameter("1/m", low=-12.0, high=12.0, scale=1.0)
     radius: float = parameter("m", low=5e-4, high=2e-2, scale=0.25, log=True)
     stiffness_ratio: float = parameter(
         "1", low=0.02, high=50.0, scale=0.15, contrast=True, accuracy=0.04
