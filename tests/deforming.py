@@ -7,6 +7,7 @@ from palpate.effects.elastic_material import PoissonRatio, StiffInclusion
 from palpate.effects.heterogeneity import (
     Anisotropy,
     StiffnessGradient,
+    StiffTube,
     StrainStiffening,
     SurfaceLayer,
 )
@@ -26,5 +27,15 @@ DEFORMING: dict[str, Effect] = {
     "strain_stiffening": StrainStiffening(J_m=4.0),
     "anisotropy": Anisotropy(direction=0.4, stiffness_ratio=3.0),
     "base_compliance": BaseCompliance(stiffness_over_E=60.0),
+    "stiff_tube": StiffTube(
+        aside=2e-3,
+        z=0.026,
+        heading=0.4,
+        inclination=0.1,
+        bend=6.0,
+        sag=-3.0,
+        radius=5e-3,
+        stiffness_ratio=4.0,
+    ),
     "tool_compliance": ToolCompliance(compliance_times_stiffness=20.0),
 }

@@ -1,4 +1,4 @@
-"""Figures around the models: touched landmarks, fixed base, lumps, and the tool's path."""
+"""Figures around the models: touched landmarks, fixed base, lumps, tubes, and the tool's path."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from palpate.app.storage.run_store import Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 
-__all__ = ["Annotations", "Lump", "annotations_of", "path_lines"]
+__all__ = ["Annotations", "Lump", "TubeAlong", "annotations_of", "path_lines", "swept"]
 
 CROSS, TOUCH = 2.5e-3, 7e-4
 """Size of a landmark's cross and radius of a touch's bead [m]."""
@@ -39,6 +39,17 @@ class Lump:
 
 
 @dataclass(frozen=True, eq=False)
+class TubeAlong:
+    """A stiff tube: axis (k, 3) [m], its radius as low, value, high [m], and half the width of the
+    interval of its place across [m].
+    """
+
+    axis: FloatArray
+    radius: tuple[float, float, float]
+    unsure: float
+
+
+@dataclass(frozen=True, eq=False)
 class Annotations:
     """Annotations of one run, phantom frame.
 
@@ -47,13 +58,20 @@ class Annotations:
         touches: (n, 3) places of the tool when it touched them [m].
         loose: edge (as "-x") and extent [m] of each strip of the base that is detached in the
             extended model.
-        lumps: inclusions of the causes.
+        lumps: balls among the causes.
+        tubes: tubes among them.
     """
 
     landmarks: FloatArray
     touches: FloatArray
     loose: tuple[tuple[str, float], ...] = ()
     lumps: tuple[Lump, ...] = ()
+    tubes: tuple[TubeAlong, ...] = ()
+
+    @property
+    def inclusions(self) -> int:
+        """Number of lumps and tubes."""
+        return len(self.lumps) + len(self.tubes)
 
     def landmark_figures(self) -> dict[str, Figure]:
         """A cross at each landmark, a bead where it was touched, and a line between them."""
@@ -109,7 +127,9 @@ class Annotations:
         return False
 
     def lump_figures(self, layer: ModelLayer, frame: int, opacity: float) -> dict[str, Figure]:
-        """Each lump as a ball, inside the ellipsoid of all its places within the intervals."""
+        """Each lump as a ball, inside the ellipsoid of all its places within the intervals; each
+        tube as a circle swept along its axis, inside a wider one.
+        """
         figures: dict[str, Figure] = {}
         ball, faces = sphere(28, 18)
         for number, lump in enumerate(self.lumps):
@@ -124,6 +144,17 @@ class Annotations:
             figures[f"lump-{number}-interval"] = SurfaceFigure(
                 float32(middle + reach * ball), faces, colours.EXTENDED, 0.2 * opacity
             )
+        for number, tube in enumerate(self.tubes, start=len(self.lumps)):
+            moved = layer.moved(frame, tube.axis)
+            at = tube.axis if moved is None else moved
+            for name, radius, share in (
+                (f"lump-{number}", tube.radius[1], 0.55),
+                (f"lump-{number}-interval", tube.radius[2] + tube.unsure, 0.2),
+            ):
+                points, faces = swept(at, radius)
+                figures[name] = SurfaceFigure(
+                    float32(points), faces, colours.EXTENDED, share * opacity
+                )
         return figures
 
 
@@ -146,7 +177,8 @@ def annotations_of(run: Run) -> Annotations:
     )
     strips = (setup.get("support") or {}).get("detached") or []
     loose = tuple((str(strip["edge"]), float(strip["extent"])) for strip in strips)
-    return Annotations(landmarks, touches, loose, tuple(_lumps(run.report.get("causes", []))))
+    causes = run.report.get("causes", [])
+    return Annotations(landmarks, touches, loose, tuple(_lumps(causes)), tuple(_tubes(causes)))
 
 
 def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
@@ -160,6 +192,18 @@ def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
         spans = {name: _span(parameters[name]) for name in ("x", "y", "z", "radius")}
         lumps.append(Lump((spans["x"], spans["y"], spans["z"]), spans["radius"]))
     return lumps
+
+
+def _tubes(causes: Sequence[dict[str, Any]]) -> list[TubeAlong]:
+    """Tubes of the causes that state their `polyline`."""
+    tubes = []
+    for cause in causes:
+        line, parameters = cause.get("polyline") or [], cause.get("parameters", {})
+        if len(line) > 1 and "radius" in parameters:
+            low, _, high = _span(parameters.get("aside", {"value": 0.0}))
+            axis = np.array(line, dtype=float)
+            tubes.append(TubeAlong(axis, _span(parameters["radius"]), (high - low) / 2))
+    return tubes
 
 
 def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:
@@ -182,6 +226,27 @@ def path_lines(layer: ModelLayer, frame: int) -> dict[str, Figure]:
             float32(segments), np.broadcast_to(shades, segments.shape).astype(np.uint8), 1.8
         )
     }
+
+
+def swept(axis: FloatArray, radius: float, around: int = 20) -> tuple[FloatArray, IntArray]:
+    """Vertices (n, 3) [m] and triangles of a circle swept along a line, with closed ends.
+
+    Args:
+        axis: points (k, 3) [m], no two neighbours alike.
+        radius: of the circle [m].
+        around: number of corners of the circle.
+    """
+    along = np.gradient(axis, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    least = np.eye(3)[int(np.abs(along).max(axis=0).argmin())]
+    across = np.cross(along, least)
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    turn = np.linspace(0, 2 * np.pi, around + 1)[:, None]
+    rings = np.cos(turn) * across[:, None] - np.sin(turn) * np.cross(along, across)[:, None]
+    rings = axis[:, None] + radius * rings
+    ends = [np.broadcast_to(end, (1, *rings.shape[1:])) for end in (axis[0], axis[-1])]
+    rows = np.concatenate([ends[0], rings, ends[1]])
+    return rows.reshape(-1, 3), lattice(len(rows), around + 1)
 
 
 @lru_cache(maxsize=4)

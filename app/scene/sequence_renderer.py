@@ -85,8 +85,8 @@ class SequenceRenderer:
 
     @property
     def lumps(self) -> int:
-        """Number of lumps that can be shown."""
-        return len(self._annotations.lumps)
+        """Number of lumps and tubes that can be shown."""
+        return self._annotations.inclusions
 
     @property
     def landmarks(self) -> int:

@@ -206,15 +206,15 @@ def with_shapes(cases: Sequence[Case]) -> list[Case]:
 
     Raises RunError for a kind of case or an effect that the bench cannot make of a shape.
     """
-    from palpate.synthetic import FAMILIES, ON_SHAPES
+    from palpate.synthetic import FAMILIES, HIDDEN_IN_SHAPES
 
     for case in cases:
-        unknown = [name for name in case.hidden if name not in ON_SHAPES]
+        unknown = [name for name in case.hidden if name not in HIDDEN_IN_SHAPES]
         if case.kind not in SHAPED or case.nuisances or unknown:
             what = unknown[0] if unknown else "nuisances" if case.nuisances else case.kind
             raise RunError(
                 f"{case.name}: the virtual bench has no {what} on a shape; kinds are "
-                f"{', '.join(SHAPED)}, and effects {', '.join(ON_SHAPES)}",
+                f"{', '.join(SHAPED)}, and effects {', '.join(HIDDEN_IN_SHAPES)}",
                 case=case.name,
             )
     families = list(FAMILIES)

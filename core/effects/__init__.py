@@ -8,6 +8,7 @@ from palpate.effects.geometry import GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
     Anisotropy,
     StiffnessGradient,
+    StiffTube,
     StrainStiffening,
     SurfaceLayer,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "PoissonRatio",
     "Slot",
     "StiffInclusion",
+    "StiffTube",
     "StiffnessGradient",
     "StrainStiffening",
     "SurfaceLayer",

@@ -19,7 +19,7 @@ from palpate.effects.family import Family
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock, Tangent
 from palpate.effects.parameter import Parameter
 from palpate.foundation.errors import EffectError
-from palpate.setup.setup import Inclusion, Setup
+from palpate.setup.setup import AnyInclusion, Inclusion, Setup
 
 __all__ = ["MEASURE_SIZE", "Effect", "Slot", "with_effects"]
 
@@ -200,6 +200,36 @@ class Effect(ABC):
         """Return the neutral effect at a place, for the linearisation LOCAL_STIFFNESS."""
         raise EffectError(f"{cls.name} has no place in the body")
 
+    def lump(self, setup: Setup) -> AnyInclusion | None:
+        """Return the part of other stiffness that the effect puts into the body of this setup; by
+        default `inclusion`.
+        """
+        return self.inclusion
+
+    @classmethod
+    def screened(
+        cls, places: Sequence[Inclusion], setup: Setup
+    ) -> Sequence[tuple[Self, AnyInclusion]]:
+        """Return the neutral effects that are screened, for the linearisation LOCAL_STIFFNESS.
+
+        By default there is one at each place.
+
+        Args:
+            places: balls on a grid, or below what the tool touched.
+            setup: as stated.
+
+        Returns:
+            the effects, each with the part of the body whose stiffness it changes.
+        """
+        return [(cls.placed(place), place) for place in places]
+
+    @classmethod
+    def around(cls, found: Inclusion, setup: Setup) -> Sequence[tuple[Self, AnyInclusion]]:
+        """Return neutral effects of another shape that may be there where a ball was fitted, each
+        with the part of the body whose stiffness it changes; none by default.
+        """
+        return []
+
     @classmethod
     def of_touches(cls, pairing: str) -> Self | None:
         """Return the effect of touching the landmarks in this order; None for most effects."""
@@ -217,6 +247,12 @@ class Effect(ABC):
         These are the parameters; an effect may add numbers that follow from them.
         """
         return {item.name: (getattr(self, item.name), item.unit) for item in self.parameters()}
+
+    def located(self, setup: Setup) -> dict[str, Any]:
+        """Return what a report's cause states of the effect's place beside the parameters, as plain
+        values; nothing by default.
+        """
+        return {}
 
     @classmethod
     def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:

@@ -15,6 +15,7 @@ from palpate.effects.geometry import GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
     Anisotropy,
     StiffnessGradient,
+    StiffTube,
     StrainStiffening,
     SurfaceLayer,
 )
@@ -57,6 +58,7 @@ _COUNTED: tuple[type[Effect], ...] = (
     GeometryScale,
     LandmarkMismatch,
     MeshResolution,
+    StiffTube,
 )
 _REPLAYED: tuple[type[Effect], ...] = (YoungModulus,)
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))

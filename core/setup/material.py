@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from palpate.foundation.errors import SetupError
 from palpate.setup.bounds import require_within
 
-__all__ = ["Fibres", "Inclusion", "Layer", "Material", "MaterialLaw", "Relaxation"]
+__all__ = [
+    "AnyInclusion",
+    "Fibres",
+    "Inclusion",
+    "Layer",
+    "Material",
+    "MaterialLaw",
+    "Point",
+    "Relaxation",
+    "Tube",
+]
 
 MaterialLaw = Literal["neo_hooke", "corotational"]
+Point = tuple[float, float, float]
+"""A place (x, y, z) in the phantom frame [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,11 +38,55 @@ class Inclusion:
         stiffness_ratio: stiffness of the inclusion over that of the rest [1].
     """
 
+    listed: ClassVar[str] = "inclusions"
     x: float
     y: float
     z: float
     radius: float
     stiffness_ratio: float
+
+    @property
+    def polyline(self) -> tuple[Point, ...]:
+        """The centre, as the line of one point around which the ball lies."""
+        return ((self.x, self.y, self.z),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tube:
+    """A tube of other stiffness, such as an artery or a wire: all within a distance of a line.
+
+    Attributes:
+        polyline: points (x, y, z) of the axis in their order, phantom frame [m]; at least two.
+        radius: [m].
+        stiffness_ratio: stiffness of the tube over that of the rest [1].
+    """
+
+    listed: ClassVar[str] = "tubes"
+    polyline: tuple[Point, ...]
+    radius: float
+    stiffness_ratio: float
+
+    def __post_init__(self) -> None:
+        if len(self.polyline) < 2:
+            raise SetupError(
+                f"the polyline of a tube has {len(self.polyline)} points; state at least two",
+                key="polyline",
+            )
+        require_within("tube radius", self.radius, 1e-5, 2.0, "m")
+        require_within("tube stiffness_ratio", self.stiffness_ratio, 1e-3, 1e3, "")
+
+
+AnyInclusion = Inclusion | Tube
+"""A part of other stiffness: all within `radius` of its `polyline`. `listed` is its key in
+`Setup.as_dict`."""
+
+
+def _listed(inclusions: Iterable[AnyInclusion]) -> dict[str, list[dict[str, Any]]]:
+    """Plain values of inclusions by kind; kinds other than balls are left out without any."""
+    found: dict[str, list[dict[str, Any]]] = {Inclusion.listed: []}
+    for one in inclusions:
+        found.setdefault(one.listed, []).append(vars(one))
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +148,7 @@ class Material:
             instantaneous one.
         poisson_ratio: Poisson's ratio, likewise [1].
         law: of elasticity.
-        inclusions: balls of other stiffness inside.
+        inclusions: balls and tubes of other stiffness inside.
         layer: a skin on the top; None for none.
         log_ratio: ln of Young's modulus at the top over that at the base, with the geometric mean
             kept [1].
@@ -107,7 +164,7 @@ class Material:
     young_modulus: float = 5.0e3
     poisson_ratio: float = 0.45
     law: MaterialLaw = "neo_hooke"
-    inclusions: tuple[Inclusion, ...] = ()
+    inclusions: tuple[AnyInclusion, ...] = ()
     layer: Layer | None = None
     log_ratio: float = 0.0
     stretch_limit: float | None = None
@@ -142,3 +199,8 @@ class Material:
     def has_history(self) -> bool:
         """Whether its stress depends on earlier deformation."""
         return bool(self.relaxation or self.retained_fraction)
+
+    @property
+    def listed_inclusions(self) -> dict[str, list[dict[str, Any]]]:
+        """Plain values of the inclusions by kind, as `Setup.as_dict` lists them."""
+        return _listed(self.inclusions)

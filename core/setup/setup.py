@@ -17,11 +17,22 @@ from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
 from palpate.setup.free_form.shape import Shape
 from palpate.setup.landmark_touches import PAIRINGS, Touching, Tracing
-from palpate.setup.material import Fibres, Inclusion, Layer, Material, MaterialLaw, Relaxation
+from palpate.setup.material import (
+    AnyInclusion,
+    Fibres,
+    Inclusion,
+    Layer,
+    Material,
+    MaterialLaw,
+    Point,
+    Relaxation,
+    Tube,
+)
 from palpate.setup.phantom_geometry import LEAST_EDGE, PATCH, SPACING, Surface
 
 __all__ = [
     "PAIRINGS",
+    "AnyInclusion",
     "Box",
     "Detachment",
     "Edge",
@@ -31,6 +42,7 @@ __all__ = [
     "Load",
     "Material",
     "MaterialLaw",
+    "Point",
     "Relaxation",
     "Sensor",
     "Setup",
@@ -39,6 +51,7 @@ __all__ = [
     "Tool",
     "Touching",
     "Tracing",
+    "Tube",
 ]
 
 Edge = Literal["-x", "+x", "-y", "+y"]
@@ -273,7 +286,7 @@ class Setup:
                 "young_modulus": self.material.young_modulus,
                 "poisson_ratio": self.material.poisson_ratio,
                 "stretch_limit": self.material.stretch_limit,
-                "inclusions": [vars(lump) for lump in self.material.inclusions],
+                **self.material.listed_inclusions,
                 "layer": None if self.material.layer is None else vars(self.material.layer),
                 "log_ratio": self.material.log_ratio,
                 "fibres": None if self.material.fibres is None else vars(self.material.fibres),

@@ -9,6 +9,7 @@ from palpate.synthetic.bodies.shape_families import FAMILIES
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
 from palpate.synthetic.make_shape_dataset import (
+    HIDDEN_IN_SHAPES,
     ON_SHAPES,
     ShapeScenario,
     draw_shape_scenario,
@@ -42,6 +43,7 @@ __all__ = [
     "FAULTS",
     "FILTERS",
     "HIDDEN",
+    "HIDDEN_IN_SHAPES",
     "NUISANCES",
     "ON_SHAPES",
     "PAPER_EFFECTS",

@@ -230,7 +230,9 @@ def _normals(palpation: Palpation, places: FloatArray) -> FloatArray:
 def _organ(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetBlock:
     """Mesh the organ for its pushes, with small elements also in a lump."""
     places = np.array([push.waypoints[-1] for push in pushes])
-    return organ_block(places, 0.8 * scenario.tool_radius, fine, lump_grading(scenario))
+    vertices = organ_surface()[0]
+    within = lump_grading(scenario, vertices.min(axis=0), vertices.max(axis=0))
+    return organ_block(places, 0.8 * scenario.tool_radius, fine, within)
 
 
 def _record(

@@ -2,7 +2,7 @@
 
 The body is drawn from a family of shapes, pushed along its normals where the camera sees it, and
 solved by the virtual bench's own solver. All pushes but one of each sequence are over a hidden
-lump.
+lump or tube.
 """
 
 from __future__ import annotations
@@ -31,13 +31,20 @@ from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
 from palpate.synthetic.bodies.shape_pushes import push_motion, reachable_places, spread_places
 from palpate.synthetic.dataset_writer import write_config, write_ply
+from palpate.synthetic.laws.stiffness_fields import beyond_inclusion, beyond_tube
 from palpate.synthetic.make_dataset import TOUCH_NOISE, draw_camera, draw_camera_shift, record_all
 from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.scenario.scenario_draws import draw_scenario
 from palpate.synthetic.scenario.truth_file import Truth
 
-__all__ = ["ON_SHAPES", "ShapeScenario", "draw_shape_scenario", "make_shape_dataset"]
+__all__ = [
+    "HIDDEN_IN_SHAPES",
+    "ON_SHAPES",
+    "ShapeScenario",
+    "draw_shape_scenario",
+    "make_shape_dataset",
+]
 
 ON_SHAPES = (
     "poisson_ratio",
@@ -55,7 +62,9 @@ ON_SHAPES = (
     "depth_bias",
     "geometry_scale",
 )
-"""Effects that the bench can hide in a free form."""
+"""Effects that the bench draws from for a free form."""
+HIDDEN_IN_SHAPES = (*ON_SHAPES, "stiff_tube")
+"""Effects that it can hide there."""
 _SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
 _PUSHES = 3
 """Pushes of a sequence."""
@@ -116,15 +125,16 @@ def draw_shape_scenario(
         raise SetupError(
             f"there is no shape {family!r}; there are {', '.join(FAMILIES)}", key="family"
         )
-    if unknown := [name for name in among if name not in ON_SHAPES]:
+    if unknown := [name for name in among if name not in HIDDEN_IN_SHAPES]:
         raise EffectError(
             f"the virtual bench cannot hide {unknown[0]!r} in a shape; "
-            f"it knows {', '.join(ON_SHAPES)}",
+            f"it knows {', '.join(HIDDEN_IN_SHAPES)}",
             effect=unknown[0],
         )
     shape, rng = draw_shape(family, seed), np.random.default_rng([seed, 41])
     drawn = draw_scenario(seed, effects, among=among).effects
-    hidden = tuple(_lump(shape, rng) if one.effect == "stiff_inclusion" else one for one in drawn)
+    placed = {"stiff_inclusion": _lump, "stiff_tube": _tube}
+    hidden = tuple(placed[one.effect](shape, rng) if one.effect in placed else one for one in drawn)
     mass = round(1000.0 * shape.volume, 5)
     corners = shape.corners[~shape.held]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -147,6 +157,33 @@ def _lump(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
     return HiddenEffect(
         "stiff_inclusion", {**values, "radius": round(radius, 5), "stiffness_ratio": ratio}
     )
+
+
+def _tube(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
+    """Draw a stiff tube, curved a little, close under the upper part of the surface."""
+    places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
+    row = int(rng.choice(np.flatnonzero(places[:, 2] > _THICK * shape.height)))
+    radius = float(rng.uniform(3e-3, 4e-3))
+    point = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
+    heading, bend = float(rng.uniform(-1.5, 1.5)), float(rng.uniform(-6.0, 6.0))
+    sag = float(rng.uniform(-6.0, 0.0))
+    along = np.array([np.cos(heading), np.sin(heading)])
+    left = np.array([-along[1], along[0]])
+    tilt = float(np.clip(-(normals[row, :2] @ along) / normals[row, 2], -0.4, 0.4))
+    away = point[:2] - (shape.low + shape.high)[:2] / 2
+    way = float(away @ along)
+    values = {
+        "aside": round(float(away @ left) - bend * way**2 / 2, 5),
+        # The slope is `tilt` under the place, and not where the axis is nearest to the middle.
+        "z": round(float(point[2]) - tilt * way + sag * way**2 / 2, 5),
+        "heading": round(heading, 4),
+        "inclination": round(float(np.arctan(tilt - sag * way)), 4),
+        "bend": round(bend, 3),
+        "sag": round(sag, 3),
+        "radius": round(radius, 5),
+        "stiffness_ratio": round(float(rng.uniform(8.0, 20.0)), 2),
+    }
+    return HiddenEffect("stiff_tube", values)
 
 
 def make_shape_dataset(
@@ -249,13 +286,14 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
 
 
 def _over_lump(drawn: ShapeScenario, places: FloatArray) -> IntArray:
-    """Rows of places (n, 3) [m] from which a hidden lump can be felt; none without a lump."""
-    lump = drawn.scenario.hidden("stiff_inclusion")
-    if lump is None:
-        return np.zeros(0, dtype=np.int64)
-    centre = np.array([lump.value(axis) for axis in "xyz"])
-    depth = np.linalg.norm(places - centre, axis=1) - lump.value("radius")
-    return np.flatnonzero(depth < _FELT)
+    """Rows of places (n, 3) [m] from which a hidden lump or tube can be felt; none without one."""
+    lump, tube = (drawn.scenario.hidden(name) for name in ("stiff_inclusion", "stiff_tube"))
+    if lump is not None:
+        return np.flatnonzero(beyond_inclusion(lump, places) < _FELT)
+    if tube is not None:
+        middle = (drawn.true.low + drawn.true.high)[:2] / 2
+        return np.flatnonzero(beyond_tube(tube, places, middle) < _FELT)
+    return np.zeros(0, dtype=np.int64)
 
 
 def _above(shape: Shape) -> FloatArray:

@@ -138,6 +138,9 @@ class FootprintCriteria:
         0.5, "1", "The outline lies where the change falls to this share of the largest."
     )
     draws: int = threshold(2000, "1", "Draws of an inclusion for the interval of its depth.")
+    along: int = threshold(
+        9, "1", "Points on each straight piece of a tube's axis that are compared with the pushes."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

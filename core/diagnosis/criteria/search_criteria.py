@@ -139,6 +139,11 @@ class ScreeningCriteria:
     inclusions_apart: float = threshold(
         0.015, "m", "Two starts of an inclusion are refitted if they are farther apart than this."
     )
+    other_shapes: float = threshold(
+        0.5,
+        "1",
+        "Share of the best gain from which other shapes are tried where a ball was fitted.",
+    )
     least_share: float = threshold(
         0.2, "1", "Smallest share of a finite effect with which a refit starts."
     )

@@ -21,7 +21,7 @@ from palpate.gradients.setup_change import TOOL_STEP, Change
 from palpate.gradients.stiffness_derivatives import stiffness_changes
 from palpate.measurement.camera_model import camera_model_for
 from palpate.replay.replay import Equilibrium, Replay
-from palpate.setup.setup import Inclusion, Setup
+from palpate.setup.setup import AnyInclusion, Setup
 
 __all__ = ["TOOL_COLUMNS", "JacobianColumns", "JacobianRequest"]
 
@@ -44,7 +44,7 @@ class JacobianRequest:
 
     setups: tuple[Setup, ...] = ()
     steps: tuple[float, ...] = ()
-    lumps: tuple[Inclusion, ...] = ()
+    lumps: tuple[AnyInclusion, ...] = ()
     pivot: FloatArray
 
 

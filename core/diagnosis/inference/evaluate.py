@@ -28,7 +28,7 @@ from palpate.effects.base import with_effects
 from palpate.effects.geometry import DIAGNOSIS_GRID
 from palpate.foundation.progress import Report, silent
 from palpate.mesh.protocol import Meshing
-from palpate.setup.setup import Inclusion, Setup
+from palpate.setup.setup import AnyInclusion, Setup
 
 __all__ = ["Evaluator", "SharedEvaluator"]
 
@@ -112,7 +112,7 @@ class Evaluator(Posterior):
         effects: Sequence[Effect],
         starts: Sequence[Prediction] | None = None,
         tangents: Sequence[Tangent] = (),
-        inclusions: Sequence[Inclusion] = (),
+        inclusions: Sequence[AnyInclusion] = (),
     ) -> Model:
         """Replay a hypothesis and return it with its columns.
 
@@ -137,7 +137,7 @@ class Evaluator(Posterior):
         effects: Sequence[Effect],
         setup: Setup,
         tangents: Sequence[Tangent],
-        inclusions: Sequence[Inclusion],
+        inclusions: Sequence[AnyInclusion],
     ) -> JacobianRequest:
         pairs = nuisance_setups(setup, self.problem.forces)
         for index, effect in enumerate(effects):
@@ -208,10 +208,19 @@ class Evaluator(Posterior):
     def baseline(
         self,
         tangents: Sequence[Tangent],
-        inclusions: Sequence[Inclusion],
+        inclusions: Sequence[AnyInclusion],
         effects: Sequence[Effect] = (),
+        spots: int | None = None,
     ) -> Model:
-        """Replay the stated setup with these effects on two meshes, which makes the noise known."""
+        """Replay the stated setup with these effects on two meshes, which makes the noise known.
+
+        Args:
+            tangents: further columns.
+            inclusions: places of inclusions, which are further columns.
+            effects: of the model.
+            spots: number of the first inclusions, in which the engine's stiffness may be off; all
+                without it.
+        """
         problem, state = self.problem, self.state
         model = self.evaluate(effects, tangents=tangents, inclusions=inclusions)
         own, known = model.predictions, list(effects)
@@ -219,7 +228,8 @@ class Evaluator(Posterior):
             known.append(DIAGNOSIS_GRID)
             own = state.on_diagnosis_grid = with_columns(self.replayed(known, own), own)
         fine = self.replayed(known, own, problem.fine_grid)
-        places, surface = model.layout.inclusions, problem.surface if problem.clouds else None
+        places = model.layout.inclusions[:spots]
+        surface = problem.surface if problem.clouds else None
         lumps, edge = slice(places[0], places[-1] + 1), problem.setup.sensor.edge
         state.noises = under_stated(noises(own, fine, surface, lumps, edge), model.predictions)
         model = self.assemble(effects, model.setup, model.predictions, tangents, len(inclusions))

@@ -20,7 +20,7 @@ from palpate.diagnosis.forward.history_columns import (
 )
 from palpate.diagnosis.forward.prediction import Prediction
 from palpate.effects import Effect, Tangent
-from palpate.setup.setup import Inclusion
+from palpate.setup.setup import AnyInclusion
 
 if TYPE_CHECKING:
     from palpate.diagnosis.inference.evaluate import Evaluator
@@ -34,7 +34,7 @@ def history_predictions(
     effects: Sequence[Effect],
     starts: Sequence[Prediction] | None,
     tangents: Sequence[Tangent],
-    inclusions: Sequence[Inclusion],
+    inclusions: Sequence[AnyInclusion],
 ) -> list[Prediction]:
     """Return predictions along the tool's path with their columns; arguments as for `evaluate`."""
     problem = evaluator.problem
@@ -90,7 +90,7 @@ def plain_model(
     effects: Sequence[Effect],
     starts: Sequence[Prediction] | None,
     tangents: Sequence[Tangent] = (),
-    inclusions: Sequence[Inclusion] = (),
+    inclusions: Sequence[AnyInclusion] = (),
 ) -> Model:
     """Return the model of the effects without history, which is reused from one fit to the next.
 

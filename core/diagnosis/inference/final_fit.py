@@ -15,7 +15,7 @@ from palpate.diagnosis.inference.gauss_newton import best_fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.effects import Effect, Tangent
 from palpate.foundation.arrays import FloatArray
-from palpate.setup.setup import Inclusion
+from palpate.setup.setup import AnyInclusion
 
 __all__ = ["refine", "settle", "with_columns_of"]
 
@@ -112,7 +112,7 @@ class _HeldColumns(SharedEvaluator):
         effects: Sequence[Effect],
         starts: Sequence[Prediction] | None = None,
         tangents: Sequence[Tangent] = (),
-        inclusions: Sequence[Inclusion] = (),
+        inclusions: Sequence[AnyInclusion] = (),
     ) -> Model:
         """Replay the effects; arguments as for `Evaluator.evaluate`."""
         model = self._told.evaluate(effects, starts, tangents, inclusions)

@@ -103,7 +103,7 @@ def with_palpation(
     pushes = push_forces(evaluator, data, findings.baseline, model)
     causes, shown = list(report["causes"]), None
     for index, effect in enumerate(model.effects):
-        if effect.inclusion is None:
+        if effect.lump(evaluator.problem.setup) is None:
             continue
         evaluator.report("where the lump is felt")
         shown = footprint_of(

@@ -1,15 +1,17 @@
 """Footprint and depth of an inclusion in force measurements.
 
 The footprint is the outline, on the surface, of the area in which a push meets at least half of the
-largest change of its force by the inclusion. Pushes as deep as the measured ones are replayed with
-the inclusion and without it, on rings around the surface place nearest to it. Depths are those of
-the inclusion's centre and of its near side (`cover`). Their intervals come from joint draws of its
-fitted parameters, because a deeper inclusion must be larger or stiffer to have the same effect.
+largest change of its force by a ball; a tube, which is felt all along, has none. Pushes as deep as
+the measured ones are replayed with the ball and without it, on rings around the surface place
+nearest to it. Depths are those of the inclusion's centre and of its near side (`cover`). Their
+intervals come from joint draws of its fitted parameters, because a deeper inclusion must be larger
+or stiffer to have the same effect.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,7 +28,7 @@ from palpate.mesh.push_meshes import PushMeshSpec
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Setup
 
-__all__ = ["Footprint", "depth_of", "footprint_of", "outline"]
+__all__ = ["Footprint", "depth_of", "felt_middle", "footprint_of", "outline"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,7 @@ class Footprint:
 def footprint_of(
     evaluator: Evaluator, effect: Effect, without: Setup, depth: float
 ) -> Footprint | None:
-    """Compute the footprint of an inclusion; None if it changes no push.
+    """Compute the footprint of a ball; None if it changes no push, and for a tube.
 
     Args:
         evaluator: with the stated geometry and the coarse mesh.
@@ -77,7 +79,8 @@ def footprint_of(
         depth: of the pushes [m].
     """
     inclusion, problem = effect.inclusion, evaluator.problem
-    assert inclusion is not None
+    if inclusion is None:
+        return None
     geometry, grid = problem.setup.geometry, problem.coarse_grid
     centre = np.array([[inclusion.x, inclusion.y, inclusion.z]])
     middle, normal = _on_surface(evaluator, centre)
@@ -182,21 +185,36 @@ def depth_of(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Depths of an inclusion's centre and near side below the surface, with 95 % intervals [m].
 
+    Those of a tube are below the push that is nearest to its axis.
+
     Args:
         evaluator: of the fitted sequences.
         model: with the inclusion among its effects.
         index: of the inclusion among them.
     """
-    effect = model.effects[index]
+    effect, problem = model.effects[index], evaluator.problem
     at = sum(len(effect.numbers()) for effect in model.effects[:index])
     own = slice(at, at + len(effect.numbers()))
     drawn = [effect.at(row.tolist()) for row in _drawn(evaluator, model, own)]
-    balls = [ball for one in (effect, *drawn) if (ball := one.inclusion) is not None]
-    depths = -evaluator.problem.setup.geometry.facing(
-        np.array([[ball.x, ball.y, ball.z] for ball in balls])
-    )[0]
-    covers = depths - np.array([ball.radius for ball in balls])
+    lumps = [lump for one in (effect, *drawn) if (lump := one.lump(problem.setup)) is not None]
+    middles = np.array([felt_middle(np.array(lump.polyline), problem.pushes[0]) for lump in lumps])
+    depths = -problem.setup.geometry.facing(middles)[0]
+    covers = depths - np.array([lump.radius for lump in lumps])
     return _interval(depths), _interval(np.maximum(covers, 0.0))
+
+
+def felt_middle(line: FloatArray, pushes: FloatArray) -> FloatArray:
+    """Point (3,) [m] of a line through points (k, 3) [m] that is nearest to a push.
+
+    Args:
+        line: centre of a ball, or axis of a tube.
+        pushes: places (n, 3) [m] of the pushes on the surface.
+    """
+    shares = np.linspace(0.0, 1.0, CRITERIA.footprint.along)[:, None]
+    pieces = [one + shares * (other - one) for one, other in pairwise(line)]
+    points = np.concatenate([line[:1], *pieces])
+    apart = np.linalg.norm(points[:, None] - pushes[None], axis=2).min(axis=1)
+    return np.asarray(points[int(apart.argmin())])
 
 
 def _drawn(evaluator: Evaluator, model: Model, own: slice) -> FloatArray:

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.report.force_report import PushForces
-from palpate.diagnosis.report.inclusion_footprint import Footprint
+from palpate.diagnosis.report.inclusion_footprint import Footprint, felt_middle
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.figure import new_figure, save_figure
 from palpate.setup.phantom_geometry import Geometry
@@ -47,7 +47,7 @@ def draw_palpation(
     bar.set_label("measured force over the stated simulation's [%]", fontsize=9)
     bar.ax.tick_params(labelsize=8)
     if cause is not None:
-        _cut(axes[1], body, cause)
+        _cut(axes[1], body, pushes, cause)
         figure.legend(loc="outside lower right", ncols=2, frameon=False, fontsize=9)
     save_figure(figure, path)
 
@@ -89,11 +89,8 @@ def _from_above(
             label="felt here, half of the strongest",
         )
     if cause is not None:
-        x, y, radius = (1e3 * cause["parameters"][name]["value"] for name in ("x", "y", "radius"))
-        turn = np.linspace(0, 2 * np.pi, 100)
         axes.plot(
-            x + radius * np.cos(turn),
-            y + radius * np.sin(turn),
+            *_seen_from_above(_line(cause), cause["parameters"]["radius"]["value"]).T,
             color=FOUND,
             lw=1.3,
             ls="--",
@@ -104,6 +101,26 @@ def _from_above(
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     _plain(axes)
     return drawn
+
+
+def _line(cause: dict[str, Any]) -> FloatArray:
+    """Axis (k, 3) [m] of a tube, or centre (1, 3) [m] of a ball."""
+    if cause.get("polyline"):
+        return np.array(cause["polyline"])
+    return np.array([[cause["parameters"][name]["value"] for name in ("x", "y", "z")]])
+
+
+def _seen_from_above(line: FloatArray, radius: float) -> FloatArray:
+    """Closed outline (n, 2) [mm] of a ball around one point [m], or of a tube around a line."""
+    if len(line) == 1:
+        turn = np.linspace(0, 2 * np.pi, 100)
+        around = np.column_stack([np.cos(turn), np.sin(turn)])
+        return np.asarray(1e3 * (line[0, :2] + radius * around))
+    plan = line[:, :2]
+    ways = np.gradient(plan, axis=0)
+    left = np.column_stack([-ways[:, 1], ways[:, 0]]) / np.linalg.norm(ways, axis=1)[:, None]
+    sides = [plan + radius * left, (plan - radius * left)[::-1]]
+    return np.asarray(1e3 * np.concatenate([*sides, sides[0][:1]]))
 
 
 def _relief(axes: Axes, body: Geometry) -> None:
@@ -122,17 +139,21 @@ def _relief(axes: Axes, body: Geometry) -> None:
     axes.tripcolor(Triangulation(x, y, triangles[up]), z, shading="gouraud", cmap=shade, zorder=0)
 
 
-def _cut(axes: Axes, body: Geometry, cause: dict[str, Any]) -> None:
+def _cut(axes: Axes, body: Geometry, pushes: PushForces, cause: dict[str, Any]) -> None:
     """Draw a section through the inclusion's centre: the phantom, the inclusion, and its depth.
 
-    The section lies along x or y, whichever the nearest surface is more inclined to.
+    The section lies along x or y, whichever the nearest surface is more inclined to. That through a
+    tube is below the push nearest to its axis, along the one more across it.
     """
     from matplotlib.collections import LineCollection
 
-    centre = np.array([cause["parameters"][name]["value"] for name in ("x", "y", "z")])
+    line = _line(cause)
+    centre = felt_middle(line, pushes.place)
     distance, normals = body.facing(centre[None])
     normal = normals[0]
     across = 0 if abs(normal[0]) >= abs(normal[1]) else 1
+    if len(line) > 1:
+        across = int(np.abs(line[-1, :2] - line[0, :2]).argmin())
     shown = [across, 2]
     outline = 1e3 * section(body, 1 - across, float(centre[1 - across]))
     axes.add_collection(LineCollection(list(outline), colors=INK, linewidths=1.8))

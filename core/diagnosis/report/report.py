@@ -68,9 +68,8 @@ def _causes(evaluator: Evaluator, findings: Findings, trials: list[Trial]) -> li
             if any(row["effect"] == effect.name for row in rows):
                 continue
             chance = sum(p for names, p in chances.items() if effect.name in names)
-            rows.append(
-                {"effect": effect.name, "probability": round(chance, 4), "parameters": entry}
-            )
+            row = {"effect": effect.name, "probability": round(chance, 4), "parameters": entry}
+            rows.append(row | effect.located(trial.model.setup))
     return rows
 
 

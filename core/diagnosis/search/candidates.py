@@ -11,13 +11,13 @@ from palpate.diagnosis.inference.effect_derivative import prior_deviation
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.screening import Candidate
 from palpate.diagnosis.search.signatures import Signature
 from palpate.effects import Effect, Linearisation, NuisanceBlock, Tangent
 from palpate.setup.setup import Setup
 
-__all__ = ["candidates_of", "mesh_candidates", "tangents_of"]
+__all__ = ["candidates_of", "local_candidate", "mesh_candidates", "tangents_of"]
 
 
 def tangents_of(
@@ -119,22 +119,17 @@ def _tangent_candidates(model: Model) -> list[Candidate]:
     ]
 
 
+def local_candidate(effect: Effect, column: int) -> Candidate:
+    """Return a neutral effect that is linearised by local stiffness, with its column."""
+    tangent = Tangent(effect=effect, of=effect.amplitude, deviation=effect.amplitude_deviation)
+    return Candidate(
+        start=effect, of=(tangent.of,), columns=(column,), spread=(prior_deviation(tangent),)
+    )
+
+
 def _inclusion_candidates(problem: InferenceProblem, model: Model) -> list[Candidate]:
-    """Return the effects that are linearised by local stiffness, at each place of the grid."""
-    places = list(zip(model.layout.inclusions, inclusion_places(problem), strict=True))
-    found = []
-    for kind in problem.applicable:
-        if kind.linearisation is Linearisation.LOCAL_STIFFNESS:
-            for column, place in places:
-                tangent = Tangent(
-                    effect=kind.placed(place), of=kind.amplitude, deviation=kind.amplitude_deviation
-                )
-                found.append(
-                    Candidate(
-                        start=tangent.effect,
-                        of=(tangent.of,),
-                        columns=(column,),
-                        spread=(prior_deviation(tangent),),
-                    )
-                )
-    return found
+    """Return the effects that are linearised by local stiffness, at each of their places."""
+    return [
+        local_candidate(effect, model.layout.inclusions[number])
+        for effect, number in screened_inclusions(problem).effects
+    ]

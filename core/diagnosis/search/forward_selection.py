@@ -7,6 +7,7 @@ cannot give, one after another.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from palpate.diagnosis.search.candidates import tangents_of
 from palpate.diagnosis.search.chance_gains import ChanceGains
 from palpate.diagnosis.search.findings import Findings, Trial
 from palpate.diagnosis.search.identifiability import identifiability_of
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.required_gain import (
     gain_to_try,
@@ -40,6 +41,7 @@ from palpate.diagnosis.search.trials import (
     screen,
     screen_again,
     settled_trials,
+    starts_around,
     trial_of,
 )
 from palpate.effects.base import with_effects
@@ -60,8 +62,9 @@ def search(evaluator: Evaluator, seed: int) -> Findings:
     known = known_mismatch(problem.catalogue, problem.setup, problem.grid, repair)
     names = [effect.name for effect in known]
     tangents = tangents_of(problem.applicable, with_effects(problem.setup, known), names)
+    inclusions = screened_inclusions(problem)
     began = time.monotonic()
-    origin = evaluator.baseline(tangents, inclusion_places(problem), known)
+    origin = evaluator.baseline(tangents, inclusions.lumps, known, inclusions.spots)
     evaluator.expect(CRITERIA.screening.search_over_baseline * (time.monotonic() - began))
     baseline = evaluator.evaluate((), origin.predictions) if known else origin
     findings = Findings(baseline, misfit=evaluator.misfit(baseline), known=known)
@@ -144,16 +147,16 @@ def _next_cause(
     # Expensive candidates, and those that are refitted whatever their gain, come last, when a
     # better one may show that they are hopeless.
     for candidate in sorted(chosen, key=lambda one: (one.start.has_history(), one in settled)):
-        hopeless = max(
-            [
-                before,
-                *(evaluator.objective(trial.model) - CRITERIA.naming.hopeless for trial in trials),
-            ]
-        )
+        hopeless = _hopeless(evaluator, before, trials)
         most = _most_promised(candidate, current, linear[id(candidate)])
         if candidate not in settled and before + most < hopeless:
             continue
         effects = [*current.model.effects, initial_guess(candidate, screened, evaluator)]
+        starts = current.model.predictions
+        trials.append(trial_of(evaluator, effects, starts, current.model, hopeless, current.model))
+    for start in starts_around(evaluator, trials, current.model):
+        hopeless = _hopeless(evaluator, before, trials)
+        effects = [*current.model.effects, start]
         starts = current.model.predictions
         trials.append(trial_of(evaluator, effects, starts, current.model, hopeless, current.model))
     trials = _with_required_gains(evaluator, findings, current, trials, seed)
@@ -172,6 +175,18 @@ def _next_cause(
         ]
     findings.trials.extend(trial if trial is best else trial.scored() for trial in trials)
     return best
+
+
+def _hopeless(evaluator: Evaluator, before: float, trials: Sequence[Trial]) -> float:
+    """Return the log evidence [nats] below which a fit is given up.
+
+    Args:
+        evaluator: of the inference problem.
+        before: log evidence of the model that is extended [nats].
+        trials: that extend it.
+    """
+    least = CRITERIA.naming.hopeless
+    return max([before, *(evaluator.objective(trial.model) - least for trial in trials)])
 
 
 def _with_required_gains(

@@ -2,16 +2,51 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.inference.inference_problem import InferenceProblem
+from palpate.effects import Effect, Linearisation
 from palpate.effects.elastic_material import inclusion_grid
 from palpate.foundation.arrays import FloatArray
 from palpate.setup.phantom_geometry import Geometry
-from palpate.setup.setup import Inclusion
+from palpate.setup.setup import AnyInclusion, Inclusion
 
-__all__ = ["inclusion_places", "inclusions_under"]
+__all__ = ["ScreenedInclusions", "inclusion_places", "inclusions_under", "screened_inclusions"]
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenedInclusions:
+    """The inclusions that are screened.
+
+    Attributes:
+        lumps: those of `inclusion_places`, in which the engine's stiffness may be off as well, and
+            then further ones.
+        spots: number of the former.
+        effects: each neutral effect with the number of its inclusion.
+    """
+
+    lumps: tuple[AnyInclusion, ...]
+    spots: int
+    effects: tuple[tuple[Effect, int], ...]
+
+
+def screened_inclusions(problem: InferenceProblem) -> ScreenedInclusions:
+    """Return the inclusions of all effects that are linearised by local stiffness."""
+    places = inclusion_places(problem)
+    numbers: dict[AnyInclusion, int] = {}
+    for place in places:
+        numbers.setdefault(place, len(numbers))
+    spots = len(numbers)
+    effects = [
+        (effect, numbers.setdefault(lump, len(numbers)))
+        for kind in problem.applicable
+        if kind.linearisation is Linearisation.LOCAL_STIFFNESS
+        for effect, lump in kind.screened(places, problem.setup)
+    ]
+    return ScreenedInclusions(tuple(numbers), spots, tuple(effects))
 
 
 def inclusion_places(problem: InferenceProblem) -> tuple[Inclusion, ...]:

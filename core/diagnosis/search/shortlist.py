@@ -12,7 +12,7 @@ from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.posterior import Posterior
 from palpate.diagnosis.search.screening import Candidate
-from palpate.effects import Effect
+from palpate.effects import Effect, Linearisation
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["beyond_first_order", "shortlist"]
@@ -52,6 +52,9 @@ def shortlist(
 ) -> list[Candidate]:
     """Return the best start of each promising effect, best first; of an inclusion two places.
 
+    Inclusions of all shapes take the place of one effect. One of another shape than a ball is left
+    out behind a ball: it has better starts once the ball is fitted.
+
     Args:
         gains: linear gain (c,) of each candidate [nats].
         candidates: of the screening.
@@ -67,12 +70,21 @@ def shortlist(
             _distance(candidate.start, other.start) > CRITERIA.screening.inclusions_apart
             for other in taken
         )
-        room = (not taken and candidate.refitted) or (
-            candidate.start.inclusion is not None and len(taken) < 2 and apart
+        kinds, ball = {_kind(c) for c in chosen}, candidate.start.inclusion is not None
+        alone = _kind(candidate) not in kinds
+        room = (not taken and candidate.refitted and (alone or ball)) or (
+            ball and len(taken) < 2 and apart
         )
-        if enough[number] and room and (taken or len({c.start.name for c in chosen}) < names):
+        if enough[number] and room and (not alone or len(kinds) < names):
             chosen.append(candidate)
     return chosen
+
+
+def _kind(candidate: Candidate) -> str:
+    """Return the name of a candidate's effect, or the linearisation that inclusions share."""
+    start = candidate.start
+    alike = start.linearisation is Linearisation.LOCAL_STIFFNESS
+    return start.linearisation.value if alike else start.name
 
 
 def _distance(one: Effect, other: Effect) -> float:

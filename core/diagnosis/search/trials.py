@@ -21,15 +21,16 @@ from palpate.diagnosis.inference.evidence import predictive_gain
 from palpate.diagnosis.inference.final_fit import settle, with_columns_of
 from palpate.diagnosis.inference.gauss_newton import refit, worth_while
 from palpate.diagnosis.inference.hypothesis import Model
-from palpate.diagnosis.search.candidates import candidates_of, tangents_of
+from palpate.diagnosis.search.candidates import candidates_of, local_candidate, tangents_of
 from palpate.diagnosis.search.findings import Trial
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
+from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides
 from palpate.diagnosis.search.signatures import Signature, updated_signatures
 from palpate.effects import Effect, Tangent
 from palpate.effects.base import with_effects
 from palpate.foundation.arrays import FloatArray
-from palpate.setup.setup import Inclusion
+from palpate.setup.setup import AnyInclusion
 
 __all__ = [
     "HeldHistory",
@@ -38,6 +39,7 @@ __all__ = [
     "screen",
     "screen_again",
     "settled_trials",
+    "starts_around",
     "trial_of",
 ]
 
@@ -71,10 +73,10 @@ def screen_again(
     """Screen the catalogue on top of a model that has causes; arguments as for `screen`."""
     problem = evaluator.problem
     tangents = tangents_of(problem.applicable, model.setup, model.names)
-    places = inclusion_places(problem)
-    extended = evaluator.evaluate(model.effects, model.predictions, tangents, places)
+    lumps = screened_inclusions(problem).lumps
+    extended = evaluator.evaluate(model.effects, model.predictions, tangents, lumps)
     if model.has_history:  # beside its replayed columns, those of another cause promise less
-        extended = with_columns_of(evaluator, extended, model, model.columns, len(places))
+        extended = with_columns_of(evaluator, extended, model, model.columns, len(lumps))
     updated = updated_signatures(evaluator, extended, signatures, origin)
     return screen(evaluator, extended, updated, origin)
 
@@ -107,6 +109,47 @@ def trial_of(
         effects = model.effects
     model = refit(evaluator, effects, starts, hopeless)
     return Trial(model, gain_over(evaluator, model, against), evaluator.misfit(model))
+
+
+def starts_around(evaluator: Evaluator, trials: Sequence[Trial], current: Model) -> list[Effect]:
+    """Return the best start of each effect of another shape than the best ball, where that lies.
+
+    Screened on a grid, a thin tube is seldom where the true one is. But a ball that is fitted to a
+    tube lies on it, about as deep.
+
+    Args:
+        evaluator: of the inference problem.
+        trials: of a further cause each.
+        current: model that they extend.
+    """
+    best = max((trial.gain for trial in trials), default=0.0)
+    balls = [trial for trial in trials if trial.model.effects[-1].inclusion is not None]
+    chosen = max(balls, key=lambda trial: trial.gain, default=None)
+    if chosen is None or chosen.gain < CRITERIA.screening.other_shapes * best:
+        return []
+    problem, ball = evaluator.problem, chosen.model.effects[-1].inclusion
+    assert ball is not None
+    rows = [
+        row
+        for kind in problem.applicable
+        if kind.name not in current.names
+        for row in kind.around(ball, problem.setup)
+    ]
+    if not rows:
+        return []
+    lumps = [lump for _, lump in rows]
+    model = evaluator.evaluate(current.effects, current.predictions, (), lumps)
+    pairs = zip(rows, model.layout.inclusions, strict=True)
+    candidates = [local_candidate(effect, column) for (effect, _), column in pairs]
+    blocks, nuisance = evaluator.tempered(model), (*model.nuisance, *model.columns)
+    known = evaluator.bounded_precision(model)
+    gains = linear_gains(blocks, right_sides(blocks), nuisance, known, candidates)[0]
+    first: dict[str, Effect] = {}
+    for number in np.argsort(-gains):
+        candidate = candidates[number]
+        if candidate.start.name not in first:
+            first[candidate.start.name] = initial_guess(candidate, model, evaluator)
+    return list(first.values())
 
 
 def settled_trials(
@@ -157,7 +200,7 @@ class HeldHistory(SharedEvaluator):
         effects: Sequence[Effect],
         starts: Sequence[Prediction] | None = None,
         tangents: Sequence[Tangent] = (),
-        inclusions: Sequence[Inclusion] = (),
+        inclusions: Sequence[AnyInclusion] = (),
     ) -> Model:
         """Replay the effects without history, and add the change by those with history.
 

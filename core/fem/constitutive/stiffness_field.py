@@ -9,9 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numba import njit
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, lengths
 from palpate.setup.phantom_geometry import Geometry
-from palpate.setup.setup import Inclusion, Layer, Material
+from palpate.setup.setup import AnyInclusion, Layer, Material
 
 __all__ = [
     "SamplePoints",
@@ -66,17 +66,40 @@ def _inside(depth: float, edge: float) -> float:
 
 
 @njit(cache=True)
-def _in_ball(places: Any, edges: Any, x: float, y: float, z: float, radius: float) -> Any:
-    """Share (m,) of the volume of points at places (m, 3) within a ball.
+def _around(places: Any, edges: Any, line: Any, ways: Any, arch: float, radius: float) -> Any:
+    """Share (m,) of the volume of points at places (m, 3) within a radius of a line (k, 3).
 
-    A diagnosis computes this for hundreds of balls in every frame.
+    A diagnosis computes this for hundreds of balls, lines of one point, in every frame. Places too
+    far from the chord, which the line leaves by `arch` [m] at most, are not compared with the rest.
+
+    Args:
+        places: rest positions [m].
+        edges: edge lengths of their parts (m,) [m].
+        line: points [m].
+        ways: (k, 4) vectors of the chord and from each point to the next [m], with one over their
+            squared lengths; none (0, 4) for one point.
+        arch: [m].
+        radius: [m].
     """
-    result = np.empty(len(places))
+    result = np.zeros(len(places))
+    x, y, z, count = line[0, 0], line[0, 1], line[0, 2], len(ways)
     for m in range(len(places)):
-        apart = math.sqrt(
-            (places[m, 0] - x) ** 2 + (places[m, 1] - y) ** 2 + (places[m, 2] - z) ** 2
-        )
-        result[m] = _inside(radius - apart, edges[m])
+        dx, dy, dz = places[m, 0] - x, places[m, 1] - y, places[m, 2] - z
+        least = dx**2 + dy**2 + dz**2
+        reach = radius + _EDGE * edges[m] + arch
+        for k in range(count):
+            ax, ay, az = ways[k, 0], ways[k, 1], ways[k, 2]
+            share = min(max((dx * ax + dy * ay + dz * az) * ways[k, 3], 0.0), 1.0)
+            off = (dx - share * ax) ** 2 + (dy - share * ay) ** 2 + (dz - share * az) ** 2
+            if k == 0:
+                if arch == 0.0 or off > reach**2:
+                    least = off
+                    break
+            else:
+                least = min(least, off)
+                dx, dy, dz = dx - ax, dy - ay, dz - az
+        if least < reach**2:
+            result[m] = _inside(radius - math.sqrt(least), edges[m])
     return result
 
 
@@ -89,12 +112,16 @@ def _within(depths: Any, edges: Any, most: float) -> Any:
     return result
 
 
-def lump_share(lump: Inclusion, points: SamplePoints) -> FloatArray:
+def lump_share(lump: AnyInclusion, points: SamplePoints) -> FloatArray:
     """Share (...) of each point's volume within the inclusion [1]."""
-    edges = points.edges
-    share = _in_ball(
-        points.places.reshape(-1, 3), edges.ravel(), lump.x, lump.y, lump.z, lump.radius
-    )
+    edges, line = points.edges, np.array(lump.polyline)
+    chord = line[-1:] - line[:1]
+    ways = np.concatenate([chord, np.diff(line, axis=0)])[: 0 if len(line) == 1 else None]
+    ways = np.column_stack([ways, 1.0 / np.maximum((ways**2).sum(axis=1), 1e-30)])
+    away = line[1:-1] - line[0]
+    along = np.clip(away @ ways[0, :3] * ways[0, 3], 0.0, 1.0)[:, None] if len(away) else away
+    arch = float(lengths(away - along * chord).max(initial=0.0)) if len(away) else 0.0
+    share = _around(points.places.reshape(-1, 3), edges.ravel(), line, ways, arch, lump.radius)
     return np.asarray(share.reshape(edges.shape))
 
 

@@ -11,6 +11,7 @@ from palpate.synthetic.laws.stiffness_fields import (
     fibre_families,
     gradient_factor,
     in_inclusion,
+    in_tube,
     layer_factor,
     uneven_density,
     uneven_poisson_ratio,
@@ -138,12 +139,16 @@ def _neighbour(scenario: Scenario) -> Neighbour | None:
 def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     """Young's modulus (e, 4) at the volume points [Pa]."""
     modulus = np.full(block.weights.shape, scenario.true_modulus)
-    lump, skin, slope = (
-        scenario.hidden(name) for name in ("stiff_inclusion", "surface_layer", "stiffness_gradient")
+    lump, tube, skin, slope = (
+        scenario.hidden(name)
+        for name in ("stiff_inclusion", "stiff_tube", "surface_layer", "stiffness_gradient")
     )
     height = scenario.true_size[2]
     if lump is not None:
         modulus[in_inclusion(lump, block.places)] *= lump.value("stiffness_ratio")
+    if tube is not None:
+        middle = (block.nodes.min(axis=0) + block.nodes.max(axis=0))[:2] / 2
+        modulus[in_tube(tube, block.places, middle)] *= tube.value("stiffness_ratio")
     if skin is not None:
         below = height - block.places[..., 2] if block.below_skin is None else block.below_skin
         modulus *= layer_factor(skin, below)

@@ -16,6 +16,7 @@ from palpate.synthetic.bench.push_segments import solve_segments
 from palpate.synthetic.bench.solved_track import SolvedPush, SolvedTrack
 from palpate.synthetic.bench.specimen import Specimen
 from palpate.synthetic.bench.true_body import base_seams, material_levels, true_offset, true_radius
+from palpate.synthetic.laws.stiffness_fields import points_along
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_block import IntArray, TetBlock, TetGrading, mesh_block
 from palpate.synthetic.solver.tet_equilibrium import InstabilityError
@@ -215,7 +216,7 @@ def _bounds(scenario: Scenario) -> tuple[FloatArray, FloatArray]:
 
 def _grading(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> TetGrading:
     """Refine at the first contact of each push and along a drag; a lump gets elements smaller than
-    its radius.
+    its radius, and a tube no larger ones.
     """
     parts = [_touched(scenario, push, fine) for push in pushes]
     points, reach, edges = (np.concatenate([part[number] for part in parts]) for number in range(3))
@@ -224,6 +225,13 @@ def _grading(scenario: Scenario, pushes: Sequence[PlannedPush], fine: float) -> 
         points = np.concatenate([points, [[lump.value(axis) for axis in "xyz"]]])
         reach = np.append(reach, lump.value("radius"))
         edges = np.append(edges, max(fine, 0.7 * lump.value("radius")))
+    tube = scenario.hidden("stiff_tube")
+    if tube is not None:
+        low, high = _bounds(scenario)
+        axis = points_along(tube, low, high)
+        points = np.concatenate([points, axis])
+        reach = np.append(reach, np.full(len(axis), tube.value("radius")))
+        edges = np.append(edges, np.full(len(axis), max(fine, tube.value("radius"))))
     return TetGrading(
         points, reach, edges, levels=material_levels(scenario), seams=base_seams(scenario)
     )

@@ -15,6 +15,7 @@ from palpate.mesh.gmsh_fill import TetSpec, fill
 from palpate.setup.free_form.closest_point import nearest
 from palpate.setup.free_form.shape import Shape
 from palpate.synthetic.bench.motion_plan import PlannedPush
+from palpate.synthetic.laws.stiffness_fields import points_along
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_block import (
     TetBlock,
@@ -58,7 +59,7 @@ class ShapeMesher:
         mesh = MeshTet(
             np.ascontiguousarray(solid.corners.T), np.ascontiguousarray(solid.tetrahedra.T)
         )
-        within = lump_grading(scenario)
+        within = lump_grading(scenario, self.shape.low, self.shape.high)
         block = tet_block_from_mesh(mesh if within is None else refine_mesh(mesh, within))
         return self._drawn(block)
 
@@ -103,12 +104,24 @@ def _vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return np.asarray(total / np.linalg.norm(total, axis=1, keepdims=True))
 
 
-def lump_grading(scenario: Scenario) -> TetGrading | None:
-    """Edges small enough for a hidden lump; None without one."""
-    lump = scenario.hidden("stiff_inclusion")
-    if lump is None:
+def lump_grading(scenario: Scenario, low: FloatArray, high: FloatArray) -> TetGrading | None:
+    """Edges small enough for a hidden lump or tube; None without one.
+
+    Args:
+        scenario: that hides it.
+        low: lowest corner (3,) of the body's bounding box [m].
+        high: highest corner (3,) [m].
+    """
+    lump, tube = (scenario.hidden(name) for name in ("stiff_inclusion", "stiff_tube"))
+    if lump is not None:
+        radius, centre = lump.value("radius"), np.array([[lump.value(axis) for axis in "xyz"]])
+        edge = 0.55 * radius
+    elif tube is not None:
+        radius, centre = tube.value("radius"), points_along(tube, low, high)
+        edge = radius
+    else:
         return None
-    radius, centre = lump.value("radius"), np.array([[lump.value(axis) for axis in "xyz"]])
+    count = len(centre)
     return TetGrading(
-        centre, np.array([1.1 * radius]), np.array([0.55 * radius]), coarse=1.0, growth=3.0
+        centre, np.full(count, 1.1 * radius), np.full(count, edge), coarse=1.0, growth=3.0
     )

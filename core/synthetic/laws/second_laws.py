@@ -53,6 +53,9 @@ SECOND_LAWS: Mapping[str, SecondLaw] = {
     "permanent_set": SecondLaw(
         "the material flows above 3 % of strain, while strain grows or is held"
     ),
+    "stiff_tube": SecondLaw(
+        "the tube tapers, by a fifth to either side", ("aside", "z", "heading")
+    ),
     "tool_friction": SecondLaw("the drag grows less than the pressure and has a limit"),
 }
 """By name of the effect. The radius and the pairing of touches have one law. So have the sizes of

@@ -8,16 +8,25 @@ from palpate.foundation.arrays import FloatArray
 from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 
 __all__ = [
+    "beyond_inclusion",
+    "beyond_tube",
     "fibre_families",
     "gradient_factor",
     "in_inclusion",
+    "in_tube",
     "layer_factor",
+    "points_along",
+    "tube_axis",
     "uneven_density",
     "uneven_poisson_ratio",
 ]
 
 _HALF_AXES = np.array([1.25, 0.85, 0.94])
 """Half axes of an ellipsoid over the radius of a ball of the same volume [1]."""
+_TAPER, _TAPERED = 0.2, 30e-3
+"""Share by which a tube grows [1] over this way from its middle, and shrinks the other way [m]."""
+_STRAIGHT = 1e-3
+"""Curvature below which a tube counts as straight [1/m]."""
 _FADING = 0.5
 """Depth below a layer in which its stiffness falls to 1/e, over its thickness [1]."""
 _RISE = 0.04
@@ -34,6 +43,82 @@ def in_inclusion(hidden: HiddenEffect, places: FloatArray) -> FloatArray:
     if hidden.second_law:
         away = away / _HALF_AXES
     return np.asarray(np.linalg.norm(away, axis=-1) < hidden.value("radius"))
+
+
+def beyond_inclusion(hidden: HiddenEffect, places: FloatArray) -> FloatArray:
+    """Return the distance (...) [m] of places (..., 3) [m] from the surface of the ball."""
+    away = places - [hidden.value(axis) for axis in "xyz"]
+    return np.asarray(np.linalg.norm(away, axis=-1) - hidden.value("radius"))
+
+
+def _frame(hidden: HiddenEffect, middle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a tube's point beside the body's middle (3,) [m], its direction there (3,), and its
+    curvature (3,) [1/m].
+    """
+    heading, slope = hidden.value("heading"), np.tan(hidden.value("inclination"))
+    way = np.array([np.cos(heading), np.sin(heading), slope])
+    left = np.array([-way[1], way[0], 0.0])
+    point = np.array([*middle, hidden.value("z")]) + hidden.value("aside") * left
+    turn = hidden.value("bend") * left + np.array([0.0, 0.0, hidden.value("sag")])
+    along = way / np.linalg.norm(way)
+    return point, along, (turn - (turn @ along) * along) / (way @ way)
+
+
+def tube_axis(hidden: HiddenEffect, middle: FloatArray, way: FloatArray) -> FloatArray:
+    """Return points (k, 3) [m] of a tube's axis, an arc of a circle.
+
+    Args:
+        hidden: the tube.
+        middle: (x, y) of the body's bounding box [m].
+        way: (k,) along the arc from the point nearest to the middle [m].
+    """
+    point, along, turn = _frame(hidden, middle)
+    curvature = float(np.linalg.norm(turn))
+    if curvature < _STRAIGHT:
+        return np.asarray(point + np.outer(way, along))
+    angle = curvature * way
+    return np.asarray(
+        point
+        + np.outer(np.sin(angle) / curvature, along)
+        + np.outer((1.0 - np.cos(angle)) / curvature**2, turn)
+    )
+
+
+def beyond_tube(hidden: HiddenEffect, places: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return the distance (...) [m] of places (..., 3) [m] from the surface of a tube.
+
+    The axis is an arc of a circle, of the stated direction and curvature where it is nearest to the
+    middle (x, y) [m] of the body's bounding box. By the second law the tube tapers.
+    """
+    point, along, turn = _frame(hidden, middle)
+    away = places - point
+    way, curvature = away @ along, float(np.linalg.norm(turn))
+    if curvature < _STRAIGHT:
+        apart = np.linalg.norm(away - way[..., None] * along, axis=-1)
+    else:
+        inwards, across = turn / curvature, np.cross(along, turn / curvature)
+        round_ = np.hypot(way, away @ inwards - 1.0 / curvature) - 1.0 / curvature
+        apart = np.hypot(round_, away @ across)
+    taper = _TAPER * np.clip(way / _TAPERED, -1.0, 1.0) if hidden.second_law else 0.0
+    return np.asarray(apart - hidden.value("radius") * (1.0 + taper))
+
+
+def in_tube(hidden: HiddenEffect, places: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return whether each of the places (..., 3) [m] is in the tube; arguments as `beyond_tube`."""
+    return np.asarray(beyond_tube(hidden, places, middle) < 0)
+
+
+def points_along(hidden: HiddenEffect, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return points (k, 3) [m] of a tube's axis a radius apart, within a bounding box.
+
+    Args:
+        hidden: the tube.
+        low: lowest corner (3,) of the body's bounding box [m].
+        high: highest corner (3,) [m].
+    """
+    end = float(np.linalg.norm(high - low)) / 2
+    points = tube_axis(hidden, (low + high)[:2] / 2, np.arange(-end, end, hidden.value("radius")))
+    return np.asarray(points[((points > low) & (points < high)).all(axis=1)])
 
 
 def layer_factor(hidden: HiddenEffect, depth: FloatArray) -> FloatArray:

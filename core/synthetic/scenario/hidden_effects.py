@@ -32,12 +32,23 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
     "viscoelasticity": {"relaxed_fraction": "1", "time_constant": "s"},
     "permanent_set": {"retained_fraction": "1"},
     "tool_friction": {"friction_coefficient": "1"},
+    "stiff_tube": {
+        "aside": "m",
+        "z": "m",
+        "heading": "rad",
+        "inclination": "rad",
+        "bend": "1/m",
+        "sag": "1/m",
+        "radius": "m",
+        "stiffness_ratio": "1",
+    },
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of
 the catalogue."""
 
-WEIGHED = tuple(name for name in HIDDEN if name != "young_modulus")
-"""The effects that show in clouds alone; a block of any modulus takes the same shape."""
+WEIGHED = tuple(name for name in HIDDEN if name not in ("young_modulus", "stiff_tube"))
+"""The effects that suites draw from. They show in clouds alone; a block of any modulus takes the
+same shape. A tube is hidden where it is asked for, so that a seed draws what it always drew."""
 
 QUICK = (
     "poisson_ratio",

@@ -35,6 +35,20 @@ def _inclusion(rng: np.random.Generator) -> dict[str, float | str]:
     }
 
 
+def _tube(rng: np.random.Generator) -> dict[str, float | str]:
+    radius = _between(rng, 2.8e-3, 4e-3)
+    return {
+        "aside": _between(rng, -7e-3, 7e-3),
+        "z": round(0.0358 - radius - _between(rng, 2e-3, 4e-3), 4),
+        "heading": _between(rng, -1.5, 1.5, 3),
+        "inclination": _between(rng, -0.08, 0.08, 3),
+        "bend": _either(rng, (-7.0, -3.0), (3.0, 7.0), decimals=2),
+        "sag": _between(rng, -4.0, 1.0, 2),
+        "radius": radius,
+        "stiffness_ratio": _between(rng, 8.0, 20.0, 1),
+    }
+
+
 def _stretch(rng: np.random.Generator) -> dict[str, float | str]:
     return {
         "offset": _between(rng, -3e-3, 3e-3, 5),
@@ -112,6 +126,7 @@ _CLEAR: Mapping[str, _Draw] = {
     },
     "permanent_set": lambda rng: {"retained_fraction": _between(rng, 0.12, 0.3, 3)},
     "tool_friction": lambda rng: {"friction_coefficient": _between(rng, 0.3, 0.8, 3)},
+    "stiff_tube": _tube,
 }
 
 

@@ -73,6 +73,10 @@ VOCABULARY = {
     "landmark_mismatch": {"pairing": "", "scale": "1", "inset": "m"},
     "young_modulus": {"E": "Pa"},
     "mesh_resolution": {"element_size": "m"},
+    "stiff_tube": {
+        **{"aside": "m", "z": "m", "heading": "rad", "inclination": "rad"},
+        **{"bend": "1/m", "sag": "1/m", "radius": "m", "stiffness_ratio": "1"},
+    },
 }
 
 # One finite size of each, for the tests that need a change.
@@ -100,6 +104,10 @@ EXAMPLES: dict[str, dict[str, float | str]] = {
     "landmark_mismatch": {"pairing": "turn-1", "scale": 0.9, "inset": 1e-3},
     "young_modulus": {"E": 1.0e4},
     "mesh_resolution": {"element_size": 9e-3},
+    "stiff_tube": {
+        **{"aside": 2e-3, "z": 0.026, "heading": 0.4, "inclination": 0.1},
+        **{"bend": 6.0, "sag": -3.0, "radius": 4e-3, "stiffness_ratio": 8.0},
+    },
 }
 EACH = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 

@@ -37,6 +37,12 @@ def _with_lump(ratio: float = 4.0, x: float = 6e-3, radius: float = 6e-3) -> Set
     return _with("stiff_inclusion", x=x, y=1e-3, z=0.024, radius=radius, stiffness_ratio=ratio)
 
 
+def _with_tube(**other: float) -> Setup:
+    """A setup with a bent tube, one of whose numbers may be another one."""
+    axis = {"aside": 2e-3, "z": 0.025, "heading": 0.4, "inclination": 0.1, "bend": 6.0, "sag": -3.0}
+    return _with("stiff_tube", **{**axis, "radius": 5e-3, "stiffness_ratio": 4.0, **other})
+
+
 LARGER = 1.0 + 1e-5
 
 
@@ -49,6 +55,20 @@ CHANGES = {
     "stiff_inclusion ratio": (_with_lump(), _with_lump(ratio=4.004)),
     "stiff_inclusion x": (_with_lump(), _with_lump(x=6.005e-3)),
     "stiff_inclusion radius": (_with_lump(), _with_lump(radius=6.003e-3)),
+    **{
+        f"stiff_tube {name}": (_with_tube(), _with_tube(**{name: value}))
+        for name, value in {
+            "aside": 2.005e-3,
+            "z": 0.025005,
+            "heading": 0.4005,
+            "inclination": 0.1005,
+            "bend": 6.05,
+            "sag": -2.95,
+            "radius": 5.003e-3,
+            "stiffness_ratio": 4.004,
+        }.items()
+    },
+    "stiff_tube that was straight": (_with_tube(bend=0.0, sag=0.0), _with_tube(bend=0.02, sag=0.0)),
     "gravity": (
         replace(SETUP, load=Load(specific_weight_over_stiffness=1.5)),
         replace(SETUP, load=Load(specific_weight_over_stiffness=1.501)),

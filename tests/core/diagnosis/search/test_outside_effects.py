@@ -23,7 +23,7 @@ from palpate.diagnosis.inference.gauss_newton import refit
 from palpate.diagnosis.observation.frame_groups import Observations
 from palpate.diagnosis.search.candidates import tangents_of
 from palpate.diagnosis.search.findings import Trial
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.shortlist import shortlist
 from palpate.diagnosis.search.trials import gain_over, screen
@@ -63,7 +63,8 @@ def _found(
         )
         problem = evaluator.problem
         tangents = tangents_of(problem.applicable, STATED)
-        baseline = evaluator.baseline(tangents, inclusion_places(problem))
+        inclusions = screened_inclusions(problem)
+        baseline = evaluator.baseline(tangents, inclusions.lumps, spots=inclusions.spots)
         extended, candidates, gains = screen(evaluator, baseline, [], baseline)
         own = [row for row, one in enumerate(candidates) if one.start.name == name]
         (best,) = shortlist(gains[own], [candidates[row] for row in own], -1e9)[:1]

@@ -76,7 +76,11 @@ def test_two_effects_are_different() -> None:
 SCALES = {"scale": 1.0, "scale_x": 1.0, "scale_y": 1.0, "scale_z": 1.0}
 NEUTRAL = {"tool_radius": 0.005, "stiffness_ratio": 1.0, "nu": 0.45, "E": 5e3, **SCALES}
 ENDLESS = ("J_m", "stiffness_over_E", "friction_coefficient")
-PLACES = ("x", "y", "z", "radius", "edge", "thickness", "direction", "pairing", "time_constant")
+AXIS = ("aside", "heading", "inclination", "bend", "sag")
+PLACES = (
+    *("x", "y", "z", "radius", "edge", "thickness", "direction", "pairing", "time_constant"),
+    *AXIS,
+)
 """Parameters that do not set the strength of an effect."""
 
 
