@@ -42,8 +42,18 @@ _LOG_EVERY = 50
 
 
 def body_for(samples: Samples, kind: str) -> Body:
-    """Return the points that a network of this kind corrects."""
-    return samples.body.upper if kind == "unet2d" else samples.body
+    """Return the points that a network of this kind corrects.
+
+    Raises CorrectionError for a network over the top of a body without a grid.
+    """
+    if kind != "unet2d":
+        return samples.body
+    if samples.chart is None:
+        raise CorrectionError(
+            "only a body with a grid has a grid over its top; take kind graph for other meshes",
+            key="kind",
+        )
+    return samples.chart
 
 
 @dataclass
@@ -101,7 +111,7 @@ class TrainingRun:
         self.network = build(spec.network, self.body, spec.seed).to(device)
         self.loss = SurfaceLoss(
             self.body,
-            samples.seen[self.body.index],
+            samples.seen[self.body.nodes],
             distance=spec.distance,
             hold=spec.hold,
             device=device,
@@ -321,13 +331,13 @@ def _input_scales(samples: Samples, rows: IntArray, body: Body) -> tuple[float, 
     squares, counts, rest = (
         torch.zeros(3, dtype=torch.float64),
         torch.zeros(3, dtype=torch.float64),
-        torch.as_tensor(body.rest),
+        torch.as_tensor(body.rest[: body.count]),
     )
     for batch in samples.batches(rows, _CHUNK):
         parts = (
             batch.tool[:, 7:10].double(),
             batch.tool[:, 10:].double(),
-            batch.positions[:, body.index].double() - rest,
+            batch.positions[:, body.nodes].double() - rest,
         )
         squares += torch.stack([part.square().sum() for part in parts])
         counts += torch.tensor([part.numel() for part in parts])

@@ -20,9 +20,19 @@ from palpate.mesh.interpolation import grid_shapes, weighted_nodes
 from palpate.mesh.protocol import FINER, Connectivity, Meshing
 
 if TYPE_CHECKING:
+    from palpate.setup.phantom_geometry import Geometry
     from palpate.setup.setup import Setup
 
-__all__ = ["BoxMesh", "GridSpec", "box_mesh", "focus_of", "meshing_for", "with_midpoints"]
+__all__ = [
+    "BoxMesh",
+    "GridSpec",
+    "block_size",
+    "box_mesh",
+    "even_grid",
+    "focus_of",
+    "meshing_for",
+    "with_midpoints",
+]
 
 _FOCUS_STEP = 2e-4
 """Step to which the focus is rounded [m], so that neighbouring frames share a mesh."""
@@ -85,11 +95,22 @@ class GridSpec:
 
     def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
         """The grid refined towards the surface point nearest to the tool."""
-        size = setup.box.size
+        size = block_size(setup)
         if self.spacing is None:
             return _mesh(size, self, (0.0, 0.0, size[2]))
         focus = focus_of(size, centre)
         return _mesh(size, self, (float(focus[0]), float(focus[1]), float(focus[2])))
+
+
+def block_size(setup: Setup) -> tuple[float, float, float]:
+    """Edge lengths [m] of a setup's block; MeshError for any other body."""
+    if not setup.geometry.is_block:
+        raise MeshError(
+            f"{setup.stated_shape.name}: hexahedra fill a block only; mesh it with tetrahedra, and "
+            "state no element size",
+            key="geometry",
+        )
+    return setup.geometry.size
 
 
 def focus_of(size: tuple[float, float, float], centre: FloatArray) -> FloatArray:
@@ -321,6 +342,15 @@ def box_mesh(
     return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
 
 
+def even_grid(geometry: Geometry, nodes: tuple[int, int, int]) -> BoxMesh:
+    """Even grid of so many nodes along x, y, z through the bounds of any body."""
+    x, y, z = (
+        even_axis(float(low), float(high), count)
+        for low, high, count in zip(geometry.low, geometry.high, nodes, strict=True)
+    )
+    return BoxMesh((x, y, z), np.array([0.0, 0.0, geometry.height]))
+
+
 def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
     """The mesh specification of a replay: the given one, unless the setup has an element size.
 
@@ -328,7 +358,7 @@ def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
     """
     if setup.element_size is None:
         return grid
-    nx, ny, nz = (max(2, round(length / setup.element_size) + 1) for length in setup.box.size)
+    nx, ny, nz = (max(2, round(length / setup.element_size) + 1) for length in block_size(setup))
     return GridSpec(nodes=(nx, ny, nz))
 
 

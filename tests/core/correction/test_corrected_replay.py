@@ -18,7 +18,8 @@ from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
 
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
-SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
+BLOCK = Box(size=SIZE)
+SETUP = Setup(geometry=BLOCK, tool=Tool(radius=5e-3))
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
 WAY = np.array([[0.004, 0.0, SIZE[2] + 5e-3 - depth] for depth in (1e-3, 2e-3, 3e-3)])
 TOOLS = np.concatenate([WAY, np.tile([1.0, *[0.0] * 9], (3, 1))], axis=1)
@@ -26,12 +27,13 @@ TOOLS = np.concatenate([WAY, np.tile([1.0, *[0.0] * 9], (3, 1))], axis=1)
 
 def _trained(kind, body=None, **about):
     """Return an untrained network whose last layer is not zero."""
-    body = body or (Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES))
+    whole = Body.of(BLOCK, NODES)
+    body = body or (whole.over(BLOCK) if kind == "unet2d" else whole)
     network = build(NetworkSpec(kind=kind, features=(4, 6)), body)
     torch.manual_seed(0)
     for parameter in network.inside.last.parameters():
         torch.nn.init.normal_(parameter, std=0.2)
-    seen = np.where(np.isclose(Body.block(SIZE, NODES).rest[:, 2], SIZE[2]), 5.0, 0.0)
+    seen = np.where(np.isclose(Body.of(BLOCK, NODES).rest[:, 2], SIZE[2]), 5.0, 0.0)
     return TrainedNetwork(
         network.eval(), body, {"force": "simulated", "seen": seen.tolist(), **about}
     )

@@ -9,15 +9,17 @@ from palpate.correction import Body, NetworkSpec, build
 from palpate.correction.networks.unet import PaddedConvolution, UNet, max_pool, max_pool_by_halves
 from palpate.correction.networks.unet_inference import UNetInference
 from palpate.foundation.errors import CorrectionError
+from palpate.setup.box import Box
 
 SIZE = (0.0687, 0.0393, 0.0358)
+BLOCK = Box(size=SIZE)
 SMALL = (4, 6, 8)
 GRIDS = [(13, 5, 5), (25, 9, 9), (4, 3, 2)]
 KINDS = ["unet2d", "unet3d", "graph"]
 
 
 def _body(kind, nodes):
-    return Body.top(SIZE, nodes) if kind == "unet2d" else Body.block(SIZE, nodes)
+    return Body.of(BLOCK, nodes).over(BLOCK) if kind == "unet2d" else Body.of(BLOCK, nodes)
 
 
 def _with_output(spec, body):
@@ -63,7 +65,7 @@ def test_untrained_network_does_not_change_the_simulation(kind):
 
 
 def test_unet_of_the_paper_has_its_layers():
-    inside = build(NetworkSpec(kind="unet2d"), Body.top(SIZE, (13, 5, 5))).inside
+    inside = build(NetworkSpec(kind="unet2d"), Body.of(BLOCK, (13, 5, 5)).over(BLOCK)).inside
     assert isinstance(inside, UNet)
     widths = [
         [part.weight.shape[0] for part in block.modules() if isinstance(part, PaddedConvolution)]
@@ -146,7 +148,7 @@ def test_graph_network_works_on_tetrahedra():
 
 
 def test_graph_network_does_not_depend_on_the_numbering_of_nodes():
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     order = torch.randperm(len(body.rest), generator=torch.Generator().manual_seed(3))
     place = torch.argsort(order)
     turned = Body(
@@ -190,7 +192,7 @@ def test_fast_inference_gives_the_same_correction(kind, nodes):
 
 
 def test_weights_depend_on_the_seed_only():
-    body = Body.top(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2)).over(BLOCK)
     first = build(NetworkSpec(features=SMALL), body, seed=4)
     torch.rand(7)
     second, other = (
@@ -221,7 +223,7 @@ def test_invalid_specification_is_refused(wrong, message):
 
 def test_network_for_another_body_is_refused():
     with pytest.raises(CorrectionError, match="2 axes"):
-        build(NetworkSpec(kind="unet2d"), Body.block(SIZE, (4, 3, 2)))
+        build(NetworkSpec(kind="unet2d"), Body.of(BLOCK, (4, 3, 2)))
 
 
 def test_spec_survives_json():

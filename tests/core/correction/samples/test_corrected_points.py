@@ -12,19 +12,20 @@ from palpate.mesh.box_mesh import GridSpec, box_mesh
 from palpate.replay.replay import replay
 
 NODES = (13, 5, 5)
+BLOCK = SETUP.geometry
 
 
 def test_surface_is_that_of_the_papers_metric():
     frame = replay(SETUP, np.array([poke(2e-3), poke(4e-3)]), GRID)[-1]
-    body = Body.block(SIZE, NODES)
+    body = Body.of(BLOCK, NODES)
     assert np.allclose(
         body.surface(frame.move(body.rest)), supersampled(frame, SETUP.surface()), atol=1e-12
     )
 
 
 def test_top_is_the_upper_layer_of_the_block():
-    body = Body.block(SIZE, NODES)
-    top = body.upper
+    body = Body.of(BLOCK, NODES)
+    top = body.over(BLOCK)
     assert top.grid == NODES[:2]
     assert top.flat
     assert np.allclose(top.rest, body.rest[top.index])
@@ -34,20 +35,20 @@ def test_top_is_the_upper_layer_of_the_block():
 
 
 def test_edges_of_a_hexahedral_mesh_are_along_its_axes():
-    grid = Body.block(SIZE, NODES)
+    grid = Body.of(BLOCK, NODES)
     mesh = Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=NODES)))
     assert {tuple(pair) for pair in mesh.edges.T} == {tuple(pair) for pair in grid.edges.T}
 
 
 @pytest.mark.parametrize("nodes", [(13, 5, 5), (25, 9, 9), (4, 3, 2)])
 def test_shares_add_up_to_one(nodes):
-    body = Body.block(SIZE, nodes)
+    body = Body.of(BLOCK, nodes)
     assert np.allclose(body.shares.sum(axis=1), 1.0)
     assert np.allclose(body.surface(body.rest).max(axis=0), body.rest.max(axis=0))
 
 
 def test_body_survives_a_file():
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     again = Body.from_arrays(body.to_arrays())
     assert again.grid == body.grid
     assert np.array_equal(again.corners, body.corners)
@@ -55,7 +56,7 @@ def test_body_survives_a_file():
 
 def test_body_without_a_grid_has_no_top_layer():
     with pytest.raises(CorrectionError, match="top layer"):
-        _ = Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=(4, 3, 2)))).upper
+        Body.of_mesh(box_mesh(SIZE, GridSpec(nodes=(4, 3, 2)))).over(BLOCK)
 
 
 def test_surface_of_tetrahedra_excludes_the_base():
