@@ -1,8 +1,9 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
-from shapes import filled_box
+from shapes import dome, filled_box
 from torch import nn
 
 from palpate.correction import Body, NetworkSpec, build
@@ -12,7 +13,7 @@ from palpate.foundation.errors import CorrectionError
 from palpate.setup.box import Box
 
 SIZE = (0.0687, 0.0393, 0.0358)
-BLOCK = Box(size=SIZE)
+BLOCK, DOME = Box(size=SIZE), dome((0.04, 0.03, 0.025))
 SMALL = (4, 6, 8)
 GRIDS = [(13, 5, 5), (25, 9, 9), (4, 3, 2)]
 KINDS = ["unet2d", "unet3d", "graph"]
@@ -229,3 +230,19 @@ def test_network_for_another_body_is_refused():
 def test_spec_survives_json():
     spec = NetworkSpec(kind="graph", features=(3, 5), trust=0.25, inputs=("pose", "force"))
     assert NetworkSpec.from_json(spec.to_json()) == spec
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_surface_of_a_dome_follows_the_correction_of_the_grid(kind):
+    body = Body.of(DOME, (5, 4, 3))
+    if kind == "unet2d":
+        body = body.over(DOME)
+    network = _with_output(NetworkSpec(kind=kind, features=SMALL), body).eval()
+    vertices, tool = _inputs(body, frames=1)
+    with torch.no_grad():
+        moved = (network(vertices, tool) - vertices)[0].numpy()
+    assert np.allclose(body.carry(moved[: body.count]), moved, atol=1e-6)
+    assert np.abs(moved[body.count :]).max() > 1e-3
+    if kind != "graph":
+        single = UNetInference(network, half=False)(vertices[0], tool[0]) - vertices[0]
+        assert np.allclose(single.numpy(), moved, atol=1e-6)
