@@ -20,7 +20,7 @@ from palpate.correction.networks.chamfer import SurfaceLoss
 from palpate.correction.sample_errors import sample_errors
 from palpate.correction.samples.corrected_points import Body
 from palpate.correction.samples.sample_splits import Split
-from palpate.correction.samples.sample_store import Samples
+from palpate.correction.samples.sample_store import Samples, body_for
 from palpate.correction.trained_network import TrainedNetwork
 from palpate.correction.training_spec import TrainingSpec
 from palpate.dataset.provenance import software_of
@@ -32,28 +32,13 @@ from palpate.foundation.rounding import rounded
 if TYPE_CHECKING:
     from torch.utils.tensorboard import SummaryWriter
 
-__all__ = ["CHECKPOINT", "HISTORY", "TrainingRun", "body_for"]
+__all__ = ["CHECKPOINT", "HISTORY", "TrainingRun"]
 
 CHECKPOINT, HISTORY = "checkpoint.pt", "history.json"
 _CHUNK = 256
 """Samples that are read at a time."""
 _LOG_EVERY = 50
 """Steps between entries of the log."""
-
-
-def body_for(samples: Samples, kind: str) -> Body:
-    """Return the points that a network of this kind corrects.
-
-    Raises CorrectionError for a network over the top of a body without a grid.
-    """
-    if kind != "unet2d":
-        return samples.body
-    if samples.chart is None:
-        raise CorrectionError(
-            "only a body with a grid has a grid over its top; take kind graph for other meshes",
-            key="kind",
-        )
-    return samples.chart
 
 
 @dataclass

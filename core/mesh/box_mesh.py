@@ -17,22 +17,12 @@ from palpate.foundation.errors import MeshError
 from palpate.mesh.elements import HEXAHEDRA
 from palpate.mesh.grid_axes import even_axis, graded_axis
 from palpate.mesh.interpolation import grid_shapes, weighted_nodes
-from palpate.mesh.protocol import FINER, Connectivity, Meshing
+from palpate.mesh.protocol import FINER, Connectivity
 
 if TYPE_CHECKING:
-    from palpate.setup.phantom_geometry import Geometry
     from palpate.setup.setup import Setup
 
-__all__ = [
-    "BoxMesh",
-    "GridSpec",
-    "block_size",
-    "box_mesh",
-    "even_grid",
-    "focus_of",
-    "meshing_for",
-    "with_midpoints",
-]
+__all__ = ["BoxMesh", "GridSpec", "block_size", "box_mesh", "focus_of", "with_midpoints"]
 
 _FOCUS_STEP = 2e-4
 """Step to which the focus is rounded [m], so that neighbouring frames share a mesh."""
@@ -340,26 +330,6 @@ def box_mesh(
     if grid.order == 2:
         axes = [with_midpoints(axis) for axis in axes]
     return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
-
-
-def even_grid(geometry: Geometry, nodes: tuple[int, int, int]) -> BoxMesh:
-    """Even grid of so many nodes along x, y, z through the bounds of any body."""
-    x, y, z = (
-        even_axis(float(low), float(high), count)
-        for low, high, count in zip(geometry.low, geometry.high, nodes, strict=True)
-    )
-    return BoxMesh((x, y, z), np.array([0.0, 0.0, geometry.height]))
-
-
-def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
-    """The mesh specification of a replay: the given one, unless the setup has an element size.
-
-    An element size stands for an even grid of trilinear hexahedra.
-    """
-    if setup.element_size is None:
-        return grid
-    nx, ny, nz = (max(2, round(length / setup.element_size) + 1) for length in block_size(setup))
-    return GridSpec(nodes=(nx, ny, nz))
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Network architectures: U-Nets over the top layer or the volume, and a graph network on any mesh.
+"""Network architectures: U-Nets over the top or the volume, and a graph network on any mesh.
 
 The U-Nets are those of Wu, Kazanzides and Unberath (2020).
 
@@ -42,7 +42,7 @@ class NetworkSpec:
     """The specification of a network.
 
     Attributes:
-        kind: "unet2d" over the top layer, "unet3d" over the volume, or "graph" over the edges of
+        kind: "unet2d" over the top, "unet3d" over the volume, or "graph" over the edges of
             any mesh.
         features: features of the blocks from fine to coarse. A graph network has the last number of
             features and as many message rounds as there are blocks.

@@ -14,7 +14,8 @@ import numpy as np
 
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError
-from palpate.mesh.box_mesh import BoxMesh, even_grid
+from palpate.mesh.box_mesh import BoxMesh
+from palpate.mesh.default_meshes import even_grid
 from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["EmbeddingGrid", "seen_from_above"]

@@ -35,7 +35,7 @@ from palpate.correction.samples.sample_arrays import ARRAYS
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError, RunError
 
-__all__ = ["FORMAT", "Batch", "Samples", "open_samples", "save_bodies"]
+__all__ = ["FORMAT", "Batch", "Samples", "body_for", "open_samples", "save_bodies"]
 
 FORMAT, BODY, CHART = 2, "body.npz", "chart.npz"
 
@@ -183,6 +183,21 @@ def open_samples(folder: Path) -> Samples:
             path=str(folder),
         )
     return Samples(folder, about, body, chart)
+
+
+def body_for(samples: Samples, kind: str) -> Body:
+    """Return the points that a network of this kind corrects.
+
+    Raises CorrectionError for a network over the top of a body without a grid.
+    """
+    if kind != "unet2d":
+        return samples.body
+    if samples.chart is None:
+        raise CorrectionError(
+            "only a body with a grid has a grid over its top; take kind graph for other meshes",
+            key="kind",
+        )
+    return samples.chart
 
 
 def save_bodies(folder: Path, body: Body, chart: Body | None) -> None:
