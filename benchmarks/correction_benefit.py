@@ -26,6 +26,7 @@ from palpate.correction import (
     SurfaceLoss,
     TrainedNetwork,
     TrainingSpec,
+    body_for,
     learn_online,
     make_samples,
     recorder_for,
@@ -84,7 +85,7 @@ def _kinds(samples: Samples, networks: dict[tuple[str, float], TrainedNetwork]) 
         "hidden moved by, mm",
         title=f"top and volume, on {TESTED}",
     )
-    top, rows = samples.body.upper, samples.rows([TESTED])
+    top, rows = body_for(samples, "unet2d"), samples.rows([TESTED])
     batch, hidden = samples.batch(rows), samples.seen == 0
     losses = (SurfaceLoss(top, samples.seen[top.index]), SurfaceLoss(samples.body, samples.seen))
 

@@ -23,10 +23,12 @@ from palpate.correction import Batch, Body, CorrectionNetwork, NetworkSpec, Surf
 from palpate.correction.networks.chamfer import Loss
 from palpate.correction.networks.unet import PaddedConvolution
 from palpate.correction.networks.unet_inference import UNetInference, supports_bfloat16
+from palpate.setup.box import Box
 
 __all__ = ["plain_loss", "plain_network", "run", "samples_of"]
 
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
+BLOCK = Box(size=SIZE)
 BATCH, POINTS, STEPS, FRAMES, CORES = 64, 1024, 4, 30, 2
 _AGREE = 2e-3
 """Largest relative difference of gradients in single precision [1]; of two equally near vertices
@@ -133,7 +135,7 @@ def _gradient(network: CorrectionNetwork, total: Tensor) -> Tensor:
 
 
 def _row(kind: str) -> tuple[str, ...]:
-    body = Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES)
+    body = Body.of(BLOCK, NODES).over(BLOCK) if kind == "unet2d" else Body.of(BLOCK, NODES)
     network, batch = build(NetworkSpec(kind=kind), body), samples_of(body, BATCH)  # type: ignore[arg-type]
     nn.init.normal_(network.inside.last.weight, std=0.02)
     loss, raw = SurfaceLoss(body, np.ones(len(body.rest)), hold=0.0), batch.positions
@@ -257,7 +259,7 @@ def _on_cuda() -> list[Table]:
 
 
 def _cuda_row(kind: str, count: int) -> tuple[str, ...]:
-    body = Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES)
+    body = Body.of(BLOCK, NODES).over(BLOCK) if kind == "unet2d" else Body.of(BLOCK, NODES)
     batch, gradients = samples_of(body, count), []
     for place in ("cpu", "cuda"):
         network = build(NetworkSpec(kind=kind), body).to(place)  # type: ignore[arg-type]

@@ -68,7 +68,7 @@ def _tool_paths() -> list[FloatArray]:
 
     Four go into the top by 8 mm, two into the sides by 6 mm, and one is slanted, 6 mm long.
     """
-    x, y, z = SETUP.box.size
+    x, y, z = SETUP.geometry.size
     radius, deep, aside = (
         SETUP.tool.radius,
         np.arange(1, 9)[:, None] * 1e-3,

@@ -59,7 +59,9 @@ class Pokes:
 
 def poke_centres() -> FloatArray:
     """Return the tool centres (8, 3) [m], from 1 to 8 mm deep."""
-    return np.array([[0.0, 0.0, SETUP.box.size[2] + SETUP.tool.radius - depth] for depth in _WAY])
+    return np.array(
+        [[0.0, 0.0, SETUP.geometry.size[2] + SETUP.tool.radius - depth] for depth in _WAY]
+    )
 
 
 def poke_frames(grid: Meshing, setup: Setup = SETUP) -> list[Equilibrium]:
@@ -71,7 +73,7 @@ def poke_frames(grid: Meshing, setup: Setup = SETUP) -> list[Equilibrium]:
 
 def top_points() -> FloatArray:
     """Return rest positions (m, 3) [m] of the points at which displacements are compared."""
-    x, y, z = SETUP.box.size
+    x, y, z = SETUP.geometry.size
     across = np.meshgrid(
         np.linspace(-x / 2, x / 2, 49), np.linspace(-y / 2, y / 2, 29), indexing="ij"
     )

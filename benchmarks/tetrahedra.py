@@ -28,7 +28,7 @@ START, STOP = 2.0, 6.0
 
 def surface() -> Shape:
     """Return the block as a surface of twelve triangles."""
-    low, high = SETUP.box.low, SETUP.box.high
+    low, high = SETUP.geometry.low, SETUP.geometry.high
     vertices = np.array(
         [np.where(np.array(list(f"{number:03b}")) == "1", high, low) for number in range(8)]
     )

@@ -46,6 +46,7 @@ from palpate.setup.setup import Box, Load, Setup, Tool
 from palpate.synthetic.bench.motion_plan import draw_motion
 
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
+BLOCK = Box(size=SIZE)
 STATED = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
 TRUE = replace(STATED, tool=Tool(radius=6.5e-3), load=Load(specific_weight_over_stiffness=2.0))
 KINDS = ("poke-top", "poke-top", "drag", "poke-side")
@@ -143,7 +144,7 @@ def _made(folder: Path, console: Console) -> Samples:
     """Return the samples in a folder, made if they are missing."""
     if (folder / "samples.json").exists():
         return open_samples(folder)
-    body, frames_of = Body.block(SIZE, NODES), _names()
+    body, frames_of = Body.of(BLOCK, NODES), _names()
     with ProcessPoolExecutor(
         min(len(frames_of), os.cpu_count() or 1), mp_context=get_context("spawn")
     ) as pool:

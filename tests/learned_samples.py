@@ -9,11 +9,13 @@ import numpy as np
 
 from palpate.correction import Body, Samples, open_samples
 from palpate.correction.samples.sample_arrays import SampleWriter
-from palpate.correction.samples.sample_store import FORMAT
+from palpate.correction.samples.sample_store import FORMAT, save_bodies
+from palpate.setup.box import Box
 
 __all__ = ["NODES", "SIZE", "write_samples"]
 
 SIZE, NODES = (0.06, 0.04, 0.03), (5, 4, 3)
+BLOCK = Box(size=SIZE)
 
 
 def write_samples(
@@ -23,7 +25,7 @@ def write_samples(
 
     The last two sequences are for validation and test, the others for training.
     """
-    rng, body = np.random.default_rng(seed), Body.block(SIZE, NODES)
+    rng, body = np.random.default_rng(seed), Body.of(BLOCK, NODES)
     folder.mkdir(parents=True)
     for name in names:
         (folder / name).mkdir()
@@ -69,9 +71,6 @@ def write_samples(
         "setup": {},
         "seen": seen.tolist(),
     }
-    np.savez(
-        folder / "body.npz",
-        **{key: value for key, value in body.to_arrays().items() if key not in ("grid", "flat")},
-    )
+    save_bodies(folder, body, body.over(BLOCK))
     (folder / "samples.json").write_text(json.dumps(about))
     return open_samples(folder)

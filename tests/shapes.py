@@ -14,7 +14,7 @@ from palpate.setup.free_form.fixed_region import FixedRegion, Plane
 from palpate.setup.setup import Shape
 from palpate.synthetic.bodies.organ_shape import write_surface
 
-__all__ = ["box_surface", "dome", "filled_box", "write_felt_shape"]
+__all__ = ["box_surface", "cut_ball", "dome", "filled_box", "write_felt_shape"]
 
 _MARKS = [(0.03, 0.02, 0.03), (0.03, -0.02, 0.03), (-0.03, -0.02, 0.03), (-0.03, 0.02, 0.03)]
 
@@ -56,6 +56,16 @@ def dome(
     triangles += [np.stack([last + here, last + beside, np.full(count, top)], 1)]
     triangles += [np.stack([beside, here, np.full(count, middle)], 1)]
     return Shape(vertices, np.concatenate(triangles), fixed or Plane(), "dome")
+
+
+def cut_ball(radius: float, middle: float) -> Shape:
+    """A ball [m] around the height `middle` [m], below its radius, cut off at z = 0: its lower part
+    overhangs.
+    """
+    ball = trimesh.creation.icosphere(3, radius)
+    vertices = np.array(ball.vertices) + np.array([0.0, 0.0, middle])
+    vertices[:, 2] = np.maximum(vertices[:, 2], 0.0)
+    return Shape(vertices, np.array(ball.faces), name="ball")
 
 
 def write_felt_shape(

@@ -27,7 +27,7 @@ def train(
         bool, typer.Option("--truth", help="Train on a virtual dataset's true effects instead.")
     ] = False,
     kind: Annotated[
-        str, typer.Option(help="unet2d (top layer), unet3d (volume) or graph (any mesh).")
+        str, typer.Option(help="unet2d (over the top), unet3d (volume) or graph (any mesh).")
     ] = "unet2d",
     features: Annotated[
         str, typer.Option(help="Features of the blocks, from fine to coarse.")

@@ -14,10 +14,9 @@ from palpate.correction.samples.corrected_points import Body
 from palpate.correction.samples.record_samples import make_samples
 from palpate.correction.samples.sample_recorder import Recorder, recorder_for
 from palpate.correction.samples.sample_splits import Split
-from palpate.correction.samples.sample_store import Batch, Samples, open_samples
+from palpate.correction.samples.sample_store import Batch, Samples, body_for, open_samples
 from palpate.correction.train import train
 from palpate.correction.trained_network import TrainedNetwork
-from palpate.correction.training_run import body_for
 from palpate.correction.training_spec import TrainingSpec
 
 __all__ = [

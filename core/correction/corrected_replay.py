@@ -7,7 +7,7 @@ keeps the detail of the dent. It is fed back in one of three ways:
     follow  the simulation moves all other points, see `palpate.correction.elastic_extension`
     start   as follow, and the next frame is solved from the corrected shape
 
-The equilibrium of an elastic block does not depend on where its solution starts, so `start` changes
+The equilibrium of an elastic body does not depend on where its solution starts, so `start` changes
 only the number of iterations.
 """
 
@@ -24,14 +24,17 @@ from palpate.correction.elastic_extension import ElasticExtension
 from palpate.correction.networks.architectures import CorrectionNetwork
 from palpate.correction.networks.chamfer import hold_weights
 from palpate.correction.networks.unet_inference import UNetInference
+from palpate.correction.samples.embedding_grid import EmbeddingGrid
 from palpate.correction.trained_network import TrainedNetwork
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError
-from palpate.mesh.box_mesh import BoxMesh, GridSpec, box_mesh
-from palpate.mesh.protocol import Meshing
+from palpate.mesh.default_meshes import even_mesh
+from palpate.mesh.interpolation import weighted_nodes
+from palpate.mesh.protocol import Mesh, Meshing
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import Replay
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Setup
 
 __all__ = ["FEEDBACKS", "CorrectedFrame", "Corrector", "Feedback", "replay_corrected"]
@@ -68,27 +71,31 @@ class Corrector:
         self.body, self.feedback = trained.body, feedback
         self.measured_force = trained.about.get("force") == "measured"
         self._network = _single(trained.network, half)
-        self._lattice = self._mesh(setup)
+        self._grid = self._grid_in(setup.geometry)
+        self._around: tuple[Mesh, IntArray, FloatArray] | None = None
         self._following: ElasticExtension | None = None
-        if feedback != "none" and self._lattice is not None:
-            self._following = ElasticExtension(setup, self._lattice, self._driven(trained))
+        if feedback != "none" and self._grid is not None:
+            mesh = even_mesh(setup, self._grid.nodes)
+            points, shares = self._grid.between(mesh.nodes)
+            used = (shares * self._used(trained)[points]).sum(axis=1)
+            self._following = ElasticExtension(setup, mesh, np.flatnonzero(used > 0.5))
 
-    def _mesh(self, setup: Setup) -> BoxMesh | None:
-        """Return the grid of all sample points; None for a body that is not a grid."""
+    def _grid_in(self, geometry: Geometry) -> EmbeddingGrid | None:
+        """Return the grid of the network's points; None for a body that is not a grid."""
         grid = self.body.grid
         if grid is None:
             return None
-        if len(grid) == 2:
-            layers = round(setup.box.size[2] / float(self.body.voxel[2])) + 1
-            grid = (*grid, layers)
-        return box_mesh(setup.box.size, GridSpec(nodes=(grid[0], grid[1], grid[2])))
+        layers = round(geometry.size[2] / float(self.body.voxel[2])) + 1
+        return EmbeddingGrid(geometry, (grid[0], grid[1], layers), self.body.flat)
 
-    def _driven(self, trained: TrainedNetwork) -> IntArray:
-        """Return the points whose correction is used: the top, or all points the camera sees."""
+    def _used(self, trained: TrainedNetwork) -> FloatArray:
+        """Return 1 for points whose correction is used (n,): the top, or all that the camera
+        sees.
+        """
         if self.body.flat:
-            return self.body.index
-        seen = np.asarray(trained.about["seen"], dtype=float)
-        return np.flatnonzero(hold_weights(seen) < 0.5)
+            return np.ones(self.body.count)
+        seen = np.asarray(trained.about["seen"], dtype=float)[self.body.nodes]
+        return np.asarray(hold_weights(seen) < 0.5, dtype=float)
 
     def correction(self, frame: Equilibrium, tool: FloatArray) -> FloatArray:
         """Return the correction of the body's points (v, 3) [m].
@@ -106,8 +113,8 @@ class Corrector:
 
     def correct(self, frame: Equilibrium, tool: FloatArray) -> Equilibrium:
         """Return the frame with its shape corrected; everything else stays simulated."""
-        moved = self.correction(frame, tool)
-        if self._lattice is None:
+        moved = self.correction(frame, tool)[: self.body.count]
+        if self._grid is None:
             if len(frame.mesh.nodes) != len(moved) or not np.allclose(
                 frame.mesh.nodes, self.body.rest, atol=1e-9
             ):
@@ -117,15 +124,19 @@ class Corrector:
                     key="mesh",
                 )
             return replace(frame, displacement=frame.displacement + moved)
-        everywhere = np.zeros((len(self._lattice.nodes), 3))
-        everywhere[self.body.index] = moved
-        if self._following is not None:
-            everywhere = self._following(everywhere)
-        return replace(
-            frame,
-            displacement=frame.displacement
-            + self._lattice.interpolate(everywhere, frame.mesh.nodes),
-        )
+        if self._following is None:
+            change = self._onto(self._grid, frame.mesh, moved)
+        else:
+            mesh = self._following.mesh
+            extended = self._following(self._onto(self._grid, mesh, moved))
+            change = mesh.interpolate(extended, frame.mesh.nodes)
+        return replace(frame, displacement=frame.displacement + change)
+
+    def _onto(self, grid: EmbeddingGrid, mesh: Mesh, moved: FloatArray) -> FloatArray:
+        """Return the correction (m, 3) [m] of a mesh's nodes of that of the grid (n, 3)."""
+        if self._around is None or self._around[0] is not mesh:
+            self._around = (mesh, *grid.between(mesh.nodes))
+        return weighted_nodes(*self._around[1:], moved)
 
 
 def _single(

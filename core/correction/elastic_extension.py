@@ -1,11 +1,11 @@
 """Elastic extension of a correction from some points of a body to all others, linearised at rest.
 
-A network over the top layer does not correct the points below. Its correction is prescribed as a
+A network over the top does not correct the points below. Its correction is prescribed as a
 displacement d_t, and all other points move to where no force acts on them:
 
     K_ff d_f + K_ft d_t = 0
 
-with K the tangent stiffness of the block at rest on the corrected grid. It is solved once; each
+with K the tangent stiffness of the body at rest on an even mesh. It is solved once; each
 correction then costs one matrix product.
 """
 
@@ -19,22 +19,22 @@ from palpate.fem.model import BlockModel
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError
 from palpate.foundation.threads import on_one_thread
-from palpate.mesh.box_mesh import BoxMesh
+from palpate.mesh.protocol import Mesh
 from palpate.setup.setup import Setup
 
 __all__ = ["ElasticExtension"]
 
 
 class ElasticExtension:
-    """Computes the displacements of all nodes of a grid from those of some.
+    """Computes the displacements of all nodes of a mesh from those of some.
 
     Args:
         setup: gives material and support.
-        mesh: the grid, of order 1.
+        mesh: fills the body.
         driven: (k,) numbers of the nodes with a prescribed displacement; base nodes stay fixed.
     """
 
-    def __init__(self, setup: Setup, mesh: BoxMesh, driven: IntArray) -> None:
+    def __init__(self, setup: Setup, mesh: Mesh, driven: IntArray) -> None:
         model = BlockModel(setup, mesh)
         free, unknown = model.topology.free, model.topology.unknown
         moved = np.intersect1d(driven, np.flatnonzero(free.all(axis=1)))
@@ -43,7 +43,7 @@ class ElasticExtension:
             raise CorrectionError(
                 "no corrected point can move: all are fixed at the base", key="driven"
             )
-        self.driven, self._rest = moved, rest
+        self.mesh, self.driven, self._rest = mesh, moved, rest
         self._response = _response(_tangent(model), unknown[rest].ravel(), unknown[moved].ravel())
 
     def __call__(self, displacement: FloatArray) -> FloatArray:

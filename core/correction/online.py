@@ -80,7 +80,7 @@ class Learner:
     def __init__(self, trained: TrainedNetwork, spec: OnlineSpec) -> None:
         self.spec, self.body, self._device = spec, trained.body, device_of(spec.device)
         self.network = deepcopy(trained.network).to(self._device)
-        seen = np.asarray(trained.about["seen"], dtype=float)[self.body.index]
+        seen = np.asarray(trained.about["seen"], dtype=float)[self.body.nodes]
         self._loss = SurfaceLoss(
             self.body, seen, distance=spec.distance, hold=spec.hold, device=self._device
         )

@@ -28,7 +28,7 @@ def sample_errors(
 ) -> Tensor:
     """Return the mean distance [mm] of each sample's measured points to the corrected surface (n,).
 
-    For a network over the top layer, of the points on the top to the top. Samples without such
+    For a network over the top, of the points that are seen from above. Samples without such
     points are left out.
 
     Args:

@@ -20,7 +20,7 @@ from palpate.correction.networks.chamfer import SurfaceLoss
 from palpate.correction.sample_errors import sample_errors
 from palpate.correction.samples.corrected_points import Body
 from palpate.correction.samples.sample_splits import Split
-from palpate.correction.samples.sample_store import Samples
+from palpate.correction.samples.sample_store import Samples, body_for
 from palpate.correction.trained_network import TrainedNetwork
 from palpate.correction.training_spec import TrainingSpec
 from palpate.dataset.provenance import software_of
@@ -32,18 +32,13 @@ from palpate.foundation.rounding import rounded
 if TYPE_CHECKING:
     from torch.utils.tensorboard import SummaryWriter
 
-__all__ = ["CHECKPOINT", "HISTORY", "TrainingRun", "body_for"]
+__all__ = ["CHECKPOINT", "HISTORY", "TrainingRun"]
 
 CHECKPOINT, HISTORY = "checkpoint.pt", "history.json"
 _CHUNK = 256
 """Samples that are read at a time."""
 _LOG_EVERY = 50
 """Steps between entries of the log."""
-
-
-def body_for(samples: Samples, kind: str) -> Body:
-    """Return the points that a network of this kind corrects."""
-    return samples.body.upper if kind == "unet2d" else samples.body
 
 
 @dataclass
@@ -101,7 +96,7 @@ class TrainingRun:
         self.network = build(spec.network, self.body, spec.seed).to(device)
         self.loss = SurfaceLoss(
             self.body,
-            samples.seen[self.body.index],
+            samples.seen[self.body.nodes],
             distance=spec.distance,
             hold=spec.hold,
             device=device,
@@ -321,13 +316,13 @@ def _input_scales(samples: Samples, rows: IntArray, body: Body) -> tuple[float, 
     squares, counts, rest = (
         torch.zeros(3, dtype=torch.float64),
         torch.zeros(3, dtype=torch.float64),
-        torch.as_tensor(body.rest),
+        torch.as_tensor(body.rest[: body.count]),
     )
     for batch in samples.batches(rows, _CHUNK):
         parts = (
             batch.tool[:, 7:10].double(),
             batch.tool[:, 10:].double(),
-            batch.positions[:, body.index].double() - rest,
+            batch.positions[:, body.nodes].double() - rest,
         )
         squares += torch.stack([part.square().sum() for part in parts])
         counts += torch.tensor([part.numel() for part in parts])

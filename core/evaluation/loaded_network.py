@@ -25,7 +25,7 @@ __all__ = ["LoadedNetwork"]
 
 @dataclass(frozen=True, eq=False)
 class LoadedNetwork:
-    """One trained network of a block.
+    """One trained network.
 
     Attributes:
         trained: the network as it was saved.

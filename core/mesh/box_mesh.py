@@ -17,12 +17,12 @@ from palpate.foundation.errors import MeshError
 from palpate.mesh.elements import HEXAHEDRA
 from palpate.mesh.grid_axes import even_axis, graded_axis
 from palpate.mesh.interpolation import grid_shapes, weighted_nodes
-from palpate.mesh.protocol import FINER, Connectivity, Meshing
+from palpate.mesh.protocol import FINER, Connectivity
 
 if TYPE_CHECKING:
     from palpate.setup.setup import Setup
 
-__all__ = ["BoxMesh", "GridSpec", "box_mesh", "focus_of", "meshing_for", "with_midpoints"]
+__all__ = ["BoxMesh", "GridSpec", "block_size", "box_mesh", "focus_of", "with_midpoints"]
 
 _FOCUS_STEP = 2e-4
 """Step to which the focus is rounded [m], so that neighbouring frames share a mesh."""
@@ -85,11 +85,22 @@ class GridSpec:
 
     def mesh(self, setup: Setup, centre: FloatArray) -> BoxMesh:
         """The grid refined towards the surface point nearest to the tool."""
-        size = setup.box.size
+        size = block_size(setup)
         if self.spacing is None:
             return _mesh(size, self, (0.0, 0.0, size[2]))
         focus = focus_of(size, centre)
         return _mesh(size, self, (float(focus[0]), float(focus[1]), float(focus[2])))
+
+
+def block_size(setup: Setup) -> tuple[float, float, float]:
+    """Edge lengths [m] of a setup's block; MeshError for any other body."""
+    if not setup.geometry.is_block:
+        raise MeshError(
+            f"{setup.stated_shape.name}: hexahedra fill a block only; mesh it with tetrahedra, and "
+            "state no element size",
+            key="geometry",
+        )
+    return setup.geometry.size
 
 
 def focus_of(size: tuple[float, float, float], centre: FloatArray) -> FloatArray:
@@ -319,17 +330,6 @@ def box_mesh(
     if grid.order == 2:
         axes = [with_midpoints(axis) for axis in axes]
     return BoxMesh((axes[0], axes[1], axes[2]), centre, grid.order)
-
-
-def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
-    """The mesh specification of a replay: the given one, unless the setup has an element size.
-
-    An element size stands for an even grid of trilinear hexahedra.
-    """
-    if setup.element_size is None:
-        return grid
-    nx, ny, nz = (max(2, round(length / setup.element_size) + 1) for length in setup.box.size)
-    return GridSpec(nodes=(nx, ny, nz))
 
 
 @lru_cache(maxsize=64)

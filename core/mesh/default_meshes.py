@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
+from palpate.mesh.box_mesh import BoxMesh, GridSpec, block_size
+from palpate.mesh.gmsh_fill import TetSpec
 from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID, Grading
-from palpate.mesh.protocol import Meshing
+from palpate.mesh.grid_axes import even_axis
+from palpate.mesh.protocol import Mesh, Meshing
 from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES, PushMeshSpec
 from palpate.setup.phantom_geometry import CLEARANCE, Geometry
 
-__all__ = ["Use", "default_mesh", "default_spec", "motion_mesh", "touched_places"]
+if TYPE_CHECKING:
+    from palpate.setup.setup import Setup
+
+__all__ = [
+    "Use",
+    "default_mesh",
+    "default_spec",
+    "even_grid",
+    "even_mesh",
+    "meshing_for",
+    "motion_mesh",
+    "touched_places",
+]
 
 
 class Use(Enum):
@@ -44,6 +60,39 @@ def default_mesh(use: Use, geometry: Geometry, radius: float, places: FloatArray
     """
     spec = default_spec(use, geometry, radius)
     return spec if isinstance(spec, Grading) else spec.at(places)
+
+
+def meshing_for(setup: Setup, grid: Meshing) -> Meshing:
+    """The mesh specification of a replay: the given one, unless the setup has an element size.
+
+    An element size stands for an even grid of trilinear hexahedra.
+    """
+    if setup.element_size is None:
+        return grid
+    nx, ny, nz = (max(2, round(length / setup.element_size) + 1) for length in block_size(setup))
+    return GridSpec(nodes=(nx, ny, nz))
+
+
+def even_grid(geometry: Geometry, nodes: tuple[int, int, int]) -> BoxMesh:
+    """Even grid of so many nodes along x, y, z through the bounds of any body."""
+    x, y, z = (
+        even_axis(float(low), float(high), count)
+        for low, high, count in zip(geometry.low, geometry.high, nodes, strict=True)
+    )
+    return BoxMesh((x, y, z), np.array([0.0, 0.0, geometry.height]))
+
+
+def even_mesh(setup: Setup, nodes: tuple[int, int, int]) -> Mesh:
+    """The mesh of a body for slow changes in all of it, the same wherever the tool is.
+
+    Hexahedra of a block have so many nodes along x, y, z; tetrahedra of any other body have edges
+    as long as the shortest side of such a hexahedron.
+    """
+    size, centre = setup.geometry.size, np.zeros(3)
+    if setup.geometry.is_block:
+        return GridSpec(nodes=nodes).mesh(setup, centre)
+    half = min(length / (count - 1) for length, count in zip(size, nodes, strict=True)) / 2
+    return TetSpec(path=(), radius=half, spacing=half, coarsest=half).mesh(setup, centre)
 
 
 def motion_mesh(use: Use, geometry: Geometry, radius: float, centres: FloatArray) -> Meshing:

@@ -20,7 +20,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
-from palpate.mesh.box_mesh import BoxMesh, focus_of, with_midpoints
+from palpate.mesh.box_mesh import BoxMesh, block_size, focus_of, with_midpoints
 from palpate.mesh.grid_axes import sized_axis, split_near
 from palpate.mesh.protocol import FINER
 
@@ -82,7 +82,7 @@ class Grading:
         """The mesh for a tool's centre (3,) [m]; the same object for positions next to each
         other.
         """
-        size = setup.box.size
+        size = block_size(setup)
         x, y, z = focus_of(size, centre).tolist()
         return _mesh(size, self, (x, y, z), _loose_edges(setup))
 
@@ -101,7 +101,7 @@ def _loose_edges(setup: Setup) -> tuple[tuple[int, float], ...]:
     lines = []
     for strip in setup.support.detached:
         axis, sign = "xy".index(strip.edge[1]), -1 if strip.edge[0] == "-" else 1
-        place = sign * (setup.box.size[axis] / 2 - strip.extent)
+        place = sign * (block_size(setup)[axis] / 2 - strip.extent)
         lines.append((axis, round(place / _LOOSE_STEP) * _LOOSE_STEP))
     return tuple(lines)
 

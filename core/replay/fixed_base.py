@@ -12,7 +12,7 @@ from palpate.fem.model import BlockModel, ToolSphere
 from palpate.fem.modified_newton import ModifiedNewton
 from palpate.fem.newton import RELATIVE_TOLERANCE, Outcome, Solution, blocked_by_base, solve
 from palpate.foundation.arrays import FloatArray
-from palpate.mesh.box_mesh import meshing_for
+from palpate.mesh.default_meshes import meshing_for
 from palpate.mesh.protocol import Mesh, Meshing
 from palpate.replay.equilibrium import Equilibrium, extrapolated, predict_from_similar
 from palpate.replay.friction_step import FrictionState, solve_with_friction

@@ -17,7 +17,7 @@ import numpy as np
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.progress import Report, silent
-from palpate.mesh.box_mesh import meshing_for
+from palpate.mesh.default_meshes import meshing_for
 from palpate.mesh.protocol import Meshing
 from palpate.replay.material_history import require_memoryless
 from palpate.replay.replay import Equilibrium, Replay

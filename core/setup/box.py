@@ -104,16 +104,20 @@ class Box(Geometry):
         halves = [half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))]
         return np.where(np.array(corners) == 1, self.high, self.low), np.array(halves)
 
-    def surface_points(self) -> FloatArray:
-        """Rest positions (m, 3) [m] spread evenly over the free surface."""
+    def surface_points(self, counts: tuple[int, int, int] | None = None) -> FloatArray:
+        """Points (m, 3) [m] of a grid on the free surface, see `Geometry.surface_points`."""
         axes = [
             np.linspace(low, high, count)
-            for low, high, count in zip(self.low, self.high, _SAMPLING, strict=True)
+            for low, high, count in zip(self.low, self.high, counts or _SAMPLING, strict=True)
         ]
         z, y, x = (axis.ravel() for axis in np.meshgrid(*axes[::-1], indexing="ij"))
         points = np.stack([x, y, z], axis=1)
         on_side = (np.abs(points[:, :2]) == self.high[:2]).any(axis=1)
         return np.asarray(points[on_side | (points[:, 2] == self.high[2])])
+
+    def heights(self, places: FloatArray) -> FloatArray:
+        """The height of the block (m,) [m], see `Geometry.heights`."""
+        return np.full(len(places), self.size[2])
 
     def surface(
         self,

@@ -107,8 +107,19 @@ class Geometry(ABC):
         """
 
     @abstractmethod
-    def surface_points(self) -> FloatArray:
-        """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""
+    def surface_points(self, counts: tuple[int, int, int] | None = None) -> FloatArray:
+        """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call.
+
+        Args:
+            counts: number of points along x, y, z of a grid over the bounds, of which a block has
+                those on its free faces; any other body has as many, and no fewer than without.
+        """
+
+    @abstractmethod
+    def heights(self, places: FloatArray) -> FloatArray:
+        """Height (m,) [m] of the highest point of the body above each of places x, y (m, 2) [m];
+        beside the body that of the nearest place of it.
+        """
 
     @abstractmethod
     def surface(

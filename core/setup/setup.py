@@ -219,16 +219,6 @@ class Setup:
             )
 
     @property
-    def box(self) -> Box:
-        """The geometry of a block; SetupError for other shapes."""
-        if isinstance(self.geometry, Shape):
-            raise SetupError(
-                f"{self.geometry.name}: this works for a block only, not for other shapes yet",
-                key="geometry",
-            )
-        return self.geometry
-
-    @property
     def stated_geometry(self) -> Box | Shape:
         """The geometry that the registrations assumed."""
         return self.registered or self.geometry

@@ -12,7 +12,7 @@ import { subscribe, state } from "./store.js";
 
 /** @type {[string, string][]} */
 const KINDS = [
-  ["unet2d", "2D U-Net, top layer"],
+  ["unet2d", "2D U-Net, over the top"],
   ["unet3d", "3D U-Net, volume"],
   ["graph", "Graph network, mesh"],
 ];

@@ -1,4 +1,4 @@
-"""Network architectures: U-Nets over the top layer or the volume, and a graph network on any mesh.
+"""Network architectures: U-Nets over the top or the volume, and a graph network on any mesh.
 
 The U-Nets are those of Wu, Kazanzides and Unberath (2020).
 
@@ -42,7 +42,7 @@ class NetworkSpec:
     """The specification of a network.
 
     Attributes:
-        kind: "unet2d" over the top layer, "unet3d" over the volume, or "graph" over the edges of
+        kind: "unet2d" over the top, "unet3d" over the volume, or "graph" over the edges of
             any mesh.
         features: features of the blocks from fine to coarse. A graph network has the last number of
             features and as many message rounds as there are blocks.
@@ -157,6 +157,8 @@ class _Round(nn.Module):
 class CorrectionNetwork(nn.Module):
     """A network that corrects the vertices of one body, given the tool.
 
+    It computes the correction of the body's nodes; further points of the body follow them.
+
     The tool's position is normalised by the body's extent. Displacement, velocity and force are
     normalised by their RMS in the samples (`set_input_scales`), which is saved with the weights.
     The position is not, because pushes at one place have almost no spread.
@@ -176,15 +178,17 @@ class CorrectionNetwork(nn.Module):
     edges: Tensor
     share: Tensor
     along: Tensor
+    carriers: Tensor
+    carried: Tensor
 
     def __init__(self, spec: NetworkSpec, body: Body) -> None:
         super().__init__()
         self.spec, self.grid, self._columns = spec, body.grid, spec.columns
-        count = len(spec.columns)
-        middle, half = body.rest.mean(axis=0), np.maximum(np.ptp(body.rest, axis=0) / 2, body.voxel)
-        self._add_buffer("rest", body.rest)
+        count, rest = len(spec.columns), body.rest[: body.count]
+        middle, half = rest.mean(axis=0), np.maximum(np.ptp(rest, axis=0) / 2, body.voxel)
+        self._add_buffer("rest", rest)
         self._add_buffer("bound", spec.trust * body.voxel)
-        self._add_buffer("place", (body.rest - middle) / half)
+        self._add_buffer("place", (rest - middle) / half)
         self._add_buffer("extent", half)
         self._add_buffer("tool_middle", np.concatenate([middle, np.zeros(10)])[spec.columns])
         self._add_buffer(
@@ -192,14 +196,18 @@ class CorrectionNetwork(nn.Module):
             np.concatenate([half, np.ones(4), np.full(3, 0.01), np.ones(3)])[spec.columns],
         )
         self._add_buffer("spread", np.array(float(body.voxel.mean()) / 4))
+        carriers = torch.as_tensor(body.carriers.astype(np.int64))
+        self.register_buffer("carriers", carriers, persistent=False)
+        carried = torch.as_tensor(body.carried, dtype=torch.float32)
+        self.register_buffer("carried", carried, persistent=False)
         self.inside: UNet | GraphNet
         if spec.kind == "graph":
-            neighbours = np.bincount(body.edges[1], minlength=len(body.rest))
+            neighbours = np.bincount(body.edges[1], minlength=len(rest))
             self.register_buffer(
                 "edges", torch.as_tensor(body.edges.astype(np.int64)), persistent=False
             )
             self._add_buffer("share", 1.0 / np.maximum(neighbours, 1)[:, None])
-            lengths = np.linalg.norm(body.rest[body.edges[0]] - body.rest[body.edges[1]], axis=1)
+            lengths = np.linalg.norm(rest[body.edges[0]] - rest[body.edges[1]], axis=1)
             self._add_buffer("along", lengths[:, None] / half.mean())
             # Displacement, position at rest, vector to the tool, and tool inputs.
             self.inside = GraphNet(3 + 3 + 3 + count, 4, spec.features[-1], len(spec.features))
@@ -232,14 +240,23 @@ class CorrectionNetwork(nn.Module):
             vertices: (b, v, 3) simulated vertices [m].
             tool: (b, 13) tool array, see TOOL_INPUTS.
         """
-        moved = (vertices - self.rest) / self.spread
+        nodes = vertices[:, : len(self.rest)]
+        moved = (nodes - self.rest) / self.spread
         known = (tool[:, self._columns] - self.tool_middle) / self.tool_scale
         output = (
-            self._graph(vertices, moved, tool, known)
+            self._graph(nodes, moved, tool, known)
             if self.grid is None or self.spec.kind == "graph"
             else self._grid(moved, known)
         )
-        return vertices + torch.tanh(output.to(vertices.dtype)) * self.bound
+        return vertices + self.carry(torch.tanh(output.to(vertices.dtype)) * self.bound)
+
+    def carry(self, change: Tensor) -> Tensor:
+        """Return the correction (b, v, 3) [m] of all points of that of the nodes (b, n, 3)."""
+        if not len(self.carriers):
+            return change
+        near = change.index_select(1, self.carriers.flatten())
+        further = near.reshape(len(change), *self.carriers.shape, 3) * self.carried[..., None]
+        return torch.cat([change, further.sum(dim=2)], dim=1)
 
     def _grid(self, moved: Tensor, known: Tensor) -> Tensor:
         axes = len(self.grid or ())

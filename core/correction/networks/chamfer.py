@@ -45,7 +45,7 @@ class Loss:
     Attributes:
         total: the value that is minimised [mm].
         distance: distance of surface and points [mm].
-        hidden: mean squared correction of hidden points [mm^2].
+        hidden: mean squared correction of hidden nodes [mm^2].
     """
 
     total: Tensor
@@ -71,7 +71,7 @@ class SurfaceLoss:
 
     Args:
         body: the body.
-        seen: (v,) measured points near each of its material points, see `Samples.seen`.
+        seen: (n,) measured points near each of its nodes, see `Samples.seen`.
         distance: "chamfer" (points to surface), "symmetric" (also the visible surface to the
             points), or "hausdorff" (the largest of both).
         hold: weight of the hidden points' squared correction [1/mm].
@@ -98,7 +98,7 @@ class SurfaceLoss:
         weights = hold_weights(seen)
         self._hidden_weights = torch.as_tensor(weights, dtype=torch.float32, device=device)
         self._visible = torch.as_tensor(
-            (weights[body.corners] * body.shares).sum(axis=1) < 0.5, device=device
+            (body.carry(weights)[body.corners] * body.shares).sum(axis=1) < 0.5, device=device
         )
         self.surface = _surface_of(body, device)
 
@@ -119,8 +119,9 @@ class SurfaceLoss:
     def __call__(self, corrected: Tensor, batch: Batch, raw: Tensor) -> Loss:
         """Return the loss of corrected and simulated vertices (b, v, 3) [m]."""
         distance = self._distance(corrected, batch) * 1e3
-        moved = ((corrected - raw) * 1e3).square().sum(dim=2)
-        hidden = (moved @ self._hidden_weights).mean() / len(self._hidden_weights)
+        nodes = len(self._hidden_weights)
+        moved = ((corrected - raw)[:, :nodes] * 1e3).square().sum(dim=2)
+        hidden = (moved @ self._hidden_weights).mean() / nodes
         return Loss(distance + self.hold * hidden, distance, hidden)
 
     def _distance(self, vertices: Tensor, batch: Batch) -> Tensor:

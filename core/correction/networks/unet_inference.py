@@ -77,7 +77,8 @@ class UNetInference:
         """Return corrected vertices (v, 3) [m] of simulated ones and the tool (13,)."""
         net = self._network
         known = ((tool[self._columns] - net.tool_middle) / net.tool_scale).to(self._type)
-        values, skips = ((vertices - net.rest) / net.spread).to(self._type), []
+        nodes = vertices[: len(net.rest)]
+        values, skips = ((nodes - net.rest) / net.spread).to(self._type), []
         for block, pool in zip(self._down, self._pools, strict=True):
             values = block(values)
             skips.append(values)
@@ -85,7 +86,8 @@ class UNetInference:
         values = self._bottom(torch.cat([values, known.expand(len(values), -1)], dim=1))
         for double, block in zip(self._doubled, self._up, strict=True):
             values = block(torch.cat([double(values), skips.pop()], dim=1))
-        return vertices + torch.tanh(self._last(values).to(vertices.dtype)) * net.bound
+        change = torch.tanh(self._last(values).to(vertices.dtype)) * net.bound
+        return vertices + net.carry(change[None])[0]
 
     def _linear(self, weight: Tensor, bias: Tensor | None) -> Step:
         ready = weight.detach().to(self._type).contiguous()

@@ -1,39 +1,51 @@
 """The material points that a network corrects, their edges, and their visible surface.
 
-The points sample the solved mesh, as in `palpate.measurement.metrics`.
+A network works on the points of a grid (`palpate.correction.samples.embedding_grid`). Where the
+free surface lies in the faces of this grid, as a block's does, it is interpolated between its
+points, as in `palpate.measurement.metrics`. Any other surface has points of its own: they are
+simulated as the grid's are, and follow the grid's correction.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from palpate.correction.samples.embedding_grid import EmbeddingGrid, seen_from_above
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError
-from palpate.mesh.box_mesh import BoxMesh, GridSpec, box_mesh
 from palpate.mesh.protocol import Mesh
+from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["FOLD", "Body"]
 
 FOLD = 3
 """Super-sampling of the surface along each axis, by linear interpolation (Wu et al. 2020)."""
+_SAME = 1e-9
+"""Points so near to each other are one [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
     """Material points, their edges and their surface.
 
+    The first n points are those that the network corrects, the nodes; c points of the surface may
+    follow.
+
     Attributes:
-        rest: (v, 3) rest positions [m], phantom frame.
-        edges: (2, e) pairs of neighbours, each in both directions.
+        rest: (v, 3) rest positions [m], phantom frame, v = n + c.
+        edges: (2, e) pairs of neighbouring nodes, each in both directions.
         voxel: (3,) distance of neighbours along x, y, z [m]; the unit of a correction's bound.
-        corners: (s, k) points between which each vertex of the super-sampled surface lies.
+        corners: (s, k) points between which each vertex of the sampled surface lies.
         shares: (s, k) linear weights of these points [1].
-        grid: number of points along x, y (and z) of a grid, x fastest; None for any other mesh.
+        grid: number of nodes along x, y (and z) of a grid, x fastest; None for any other mesh.
         index: (v,) numbers of these points among those of the samples.
-        flat: whether the body is the top layer, which is compared with points of the top only.
+        flat: whether the nodes lie over the top, which is compared with points of the top only.
+        carriers: (c, k) nodes whose correction each further point follows.
+        carried: (c, k) linear weights of these nodes [1].
     """
 
     rest: FloatArray
@@ -44,58 +56,93 @@ class Body:
     grid: tuple[int, ...] | None
     index: IntArray
     flat: bool = False
+    carriers: IntArray = field(default_factory=lambda: np.zeros((0, 1), dtype=np.int64))
+    carried: FloatArray = field(default_factory=lambda: np.zeros((0, 1)))
 
     @classmethod
-    def block(cls, size: tuple[float, float, float], nodes: tuple[int, int, int]) -> Self:
-        """Return the points of a regular grid through a block.
-
-        The surface is the top and the four sides.
-
-        Args:
-            size: (x, y, z) edge lengths of the block [m].
-            nodes: number of points along x, y, z.
+    def of(cls, geometry: Geometry, nodes: tuple[int, int, int]) -> Self:
+        """Return a grid of so many points along x, y, z through the bounds of a body, with its
+        free surface.
         """
-        mesh, dense = _grids(size, nodes)
-        places = dense.nodes[np.unique(dense.free_surface)]
-        every = np.arange(len(mesh.nodes))
-        return cls(
-            mesh.nodes,
-            _grid_edges(nodes),
-            _voxel(size, nodes),
-            *_between(mesh, places, every),
-            nodes,
-            every,
-        )
+        grid = EmbeddingGrid(geometry, nodes)
+        return cls._on(grid, geometry.surface_points(_sampling(nodes)))
 
-    @classmethod
-    def top(cls, size: tuple[float, float, float], nodes: tuple[int, int, int]) -> Self:
-        """Return the top layer of the same grid."""
-        mesh, dense = _grids(size, nodes)
-        flat = (nodes[0], nodes[1])
-        index = np.arange(len(mesh.nodes))[-nodes[0] * nodes[1] :]
-        places = dense.nodes[np.unique(dense.faces["+z"])]
-        edges = _grid_edges((*flat, 1))
-        return cls(
-            mesh.nodes[index],
-            edges,
-            _voxel(size, nodes),
-            *_between(mesh, places, index),
-            flat,
-            index,
-            True,
-        )
+    def over(self, geometry: Geometry) -> Self:
+        """Return the grid over the top of the same body, with the surface that is seen from above.
 
-    @property
-    def upper(self) -> Self:
-        """The top layer of a grid; CorrectionError for any other body."""
+        Raises CorrectionError where this body is no grid of three axes.
+        """
         if self.grid is None or len(self.grid) != 3:
             raise CorrectionError(
                 "only a grid of three axes has a top layer; take kind graph for other meshes",
                 key="kind",
             )
         nx, ny, nz = self.grid
-        x, y, z = (float(length) for length in np.ptp(self.rest, axis=0))
-        return type(self).top((x, y, z), (nx, ny, nz))
+        grid = EmbeddingGrid(geometry, (nx, ny, nz), flat=True)
+        places = geometry.surface_points(_sampling(grid.nodes))
+        seen = seen_from_above(geometry, places)
+        made = type(self)._on(grid, places[seen], in_faces=not len(self.carriers))
+        # Points that both have are sampled once.
+        apart, known = cKDTree(self.rest).query(grid.points)
+        fresh = apart > _SAME
+        numbers = np.where(fresh, len(self.rest) + np.cumsum(fresh) - 1, known)
+        surface = self.count + np.flatnonzero(seen) if len(made.carriers) else []
+        return replace(made, index=np.concatenate([numbers, surface]).astype(np.int64))
+
+    @classmethod
+    def _on(cls, grid: EmbeddingGrid, places: FloatArray, in_faces: bool | None = None) -> Self:
+        """Return the points of a grid with a surface sampled at places (s, 3) [m]."""
+        points, shares = grid.between(places)
+        count, edges = (
+            len(grid.points),
+            _grid_edges((*grid.nodes[:2], 1 if grid.flat else grid.nodes[2])),
+        )
+        within = grid.holds(places) if in_faces is None else in_faces
+        if within:
+            heaviest = np.argsort(-shares, axis=1, kind="stable")[:, :4]
+            return cls(
+                grid.points,
+                edges,
+                grid.voxel,
+                np.take_along_axis(points, heaviest, 1),
+                np.take_along_axis(shares, heaviest, 1),
+                grid.shape,
+                np.arange(count),
+                grid.flat,
+            )
+        return cls(
+            np.concatenate([grid.points, places]),
+            edges,
+            grid.voxel,
+            count + np.arange(len(places))[:, None],
+            np.ones((len(places), 1)),
+            grid.shape,
+            np.arange(count + len(places)),
+            grid.flat,
+            points,
+            shares,
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of nodes."""
+        return len(self.rest) - len(self.carriers)
+
+    @property
+    def nodes(self) -> IntArray:
+        """Numbers (n,) of the nodes among the points of the samples."""
+        return self.index[: self.count]
+
+    def carry(self, values: FloatArray) -> FloatArray:
+        """Return values (v, ...) at all points of values (n, ...) at the nodes."""
+        further = np.einsum("ck,ck...->c...", self.carried, values[self.carriers])
+        return np.concatenate([values, further])
+
+    def gather(self, counts: FloatArray) -> FloatArray:
+        """Return numbers of things (n,) near the nodes of numbers (v,) near all points."""
+        near = np.array(counts[: self.count], dtype=float)
+        np.add.at(near, self.carriers, self.carried * counts[self.count :, None])
+        return near
 
     @classmethod
     def of_mesh(cls, mesh: Mesh) -> Self:
@@ -128,35 +175,10 @@ class Body:
         return cls(**plain, grid=grid, flat=bool(data["flat"]))
 
 
-def _grids(
-    size: tuple[float, float, float], nodes: tuple[int, int, int]
-) -> tuple[BoxMesh, BoxMesh]:
-    """Return the grid and the super-sampled one."""
-    if len(nodes) != 3 or min(nodes) < 2:
-        raise CorrectionError(
-            f"a grid has two points or more along each of three axes, got {nodes}", key="nodes"
-        )
-    nx, ny, nz = (FOLD * (n - 1) + 1 for n in nodes)
-    return box_mesh(size, GridSpec(nodes=nodes)), box_mesh(size, GridSpec(nodes=(nx, ny, nz)))
-
-
-def _voxel(size: tuple[float, float, float], nodes: tuple[int, int, int]) -> FloatArray:
-    return np.asarray(np.array(size) / (np.array(nodes) - 1))
-
-
-def _between(mesh: BoxMesh, places: FloatArray, index: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return corners and shares (s, 4) of places (s, 3) [m] on the surface.
-
-    Corners are numbers within `index` (v,), the nodes that are used.
-    """
-    nodes, shares = mesh.locate(places)
-    heaviest = np.argsort(-shares, axis=1, kind="stable")[:, :4]
-    nodes, shares = np.take_along_axis(nodes, heaviest, 1), np.take_along_axis(shares, heaviest, 1)
-    number = np.full(len(mesh.nodes), -1)
-    number[index] = np.arange(len(index))
-    own = number[nodes]
-    # A corner outside `index` has no weight, so that any other corner can replace it.
-    return np.where(own < 0, own.max(axis=1, keepdims=True), own), np.where(own < 0, 0.0, shares)
+def _sampling(nodes: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Return the points along x, y, z of the super-sampled grid."""
+    nx, ny, nz = (FOLD * (count - 1) + 1 for count in nodes)
+    return nx, ny, nz
 
 
 def _grid_edges(nodes: tuple[int, int, int]) -> IntArray:

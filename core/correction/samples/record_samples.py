@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.correction.samples.sample_arrays import SampleWriter
 from palpate.correction.samples.sample_recorder import Recorder, measured_points
-from palpate.correction.samples.sample_store import FORMAT, Samples, open_samples
+from palpate.correction.samples.sample_store import FORMAT, Samples, open_samples, save_bodies
 from palpate.correction.samples.tool_columns import tool_columns
 from palpate.dataset import Dataset
 from palpate.dataset.provenance import made_from
@@ -112,7 +112,7 @@ class _Recorded:
         name: name of the sequence.
         count: number of samples.
         left_out: number of frames that were left out.
-        seen: (v,) measured points near each material point.
+        seen: (r,) measured points near each material point.
     """
 
     name: str
@@ -154,7 +154,7 @@ def _record(
     tool = tool_columns(sequence, times, robot, recorder.measured)
     camera, probes = camera_model_for(setup), _push_numbers(setup, centres)
     (folder / name).mkdir()
-    writer = SampleWriter(folder / name, len(chosen), len(recorder.body.rest), recorder.points)
+    writer = SampleWriter(folder / name, len(chosen), len(recorder.rest), recorder.points)
     seen, row = np.zeros(len(recorder.body.rest)), 0
     block, previous = Replay(setup, recorder.grid, TOLERANCE), None
     for number, index in enumerate(chosen):
@@ -173,7 +173,7 @@ def _record(
             tool[number, 10:] = frame.force
         writer.put(
             row,
-            positions=frame.move(recorder.body.rest),
+            positions=frame.move(recorder.rest),
             tool=tool[number],
             points=points,
             count=(upper, len(points)),
@@ -183,7 +183,7 @@ def _record(
         )
         row += 1
     writer.close(row)
-    return _Recorded(name, row, len(chosen) - row, seen)
+    return _Recorded(name, row, len(chosen) - row, recorder.seen(seen))
 
 
 def _push_numbers(setup: Setup, centres: FloatArray) -> FloatArray:
@@ -222,10 +222,5 @@ def _write_about(
         "setup": recorder.setup.as_dict(),
         "seen": (np.sum([one.seen for one in made], axis=0) / total).tolist(),
     }
-    arrays = {
-        name: value
-        for name, value in recorder.body.to_arrays().items()
-        if name not in ("grid", "flat")
-    }
-    np.savez(folder / "body.npz", **arrays)
+    save_bodies(folder, recorder.body, recorder.chart)
     (folder / "samples.json").write_text(json.dumps(about, indent=1))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.correction.samples.corrected_points import Body
+from palpate.correction.samples.embedding_grid import seen_from_above
 from palpate.dataset import Dataset
 from palpate.experiment import Experiment
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.foundation.frames import Transform
 from palpate.measurement.camera_model import CameraModel
 from palpate.measurement.segmentation import Cleaner
@@ -33,6 +35,7 @@ class Recorder:
         setup: the setup of the model.
         grid: its mesh protocol.
         body: the material points that are sampled.
+        chart: those over the top, of a body with a grid; None for any other.
         cleaner: segments the phantom out of the clouds.
         shaft: of the tool, in its frame; None if unknown.
         points: most points of a cloud.
@@ -44,6 +47,7 @@ class Recorder:
     setup: Setup
     grid: Meshing
     body: Body
+    chart: Body | None
     cleaner: Cleaner
     shaft: ToolShaft | None
     points: int
@@ -54,6 +58,30 @@ class Recorder:
     def phantom_from_robot(self) -> Transform:
         """The robot registration under the setup, corrected for the sag at the touches."""
         return touch_correction(self.setup, self.grid) @ self.setup.phantom_from_robot
+
+    @cached_property
+    def rest(self) -> FloatArray:
+        """Rest positions (r, 3) [m] of all points of both bodies, in the order of the samples."""
+        bodies = [self.body] if self.chart is None else [self.body, self.chart]
+        rest = np.zeros((1 + max(int(one.index.max()) for one in bodies), 3))
+        for one in reversed(bodies):
+            rest[one.index] = one.rest
+        return rest
+
+    @cached_property
+    def upper(self) -> BoolArray:
+        """Mark the vertices of the sampled surface that are seen from above (s,)."""
+        return seen_from_above(self.setup.geometry, self.body.surface(self.body.rest))
+
+    def seen(self, near: FloatArray) -> FloatArray:
+        """Return the measured points near all points (r,) of those near the body's (v,)."""
+        seen, count = np.zeros(len(self.rest)), self.body.count
+        if self.chart is not None and len(self.chart.carriers):
+            carried = near[self.chart.index[self.chart.count :]]
+            nodes = np.concatenate([np.zeros(self.chart.count), carried])
+            seen[self.chart.nodes] = self.chart.gather(nodes)
+        seen[self.body.index] = np.concatenate([self.body.gather(near), near[count:]])
+        return seen
 
     def only(self, name: str) -> Recorder:
         """Return the recorder with one sequence only, to be sent to a process."""
@@ -85,12 +113,14 @@ def recorder_for(
     """
     experiment = experiment or Experiment.of(dataset)
     dataset, setup = experiment.dataset, setup or experiment.stated
+    sampled = body or Body.of(setup.geometry, nodes)
     with_forces = [dataset.sequence(name).forces is not None for name in dataset.sequences]
     return Recorder(
         dataset,
         setup,
         grid or experiment.mesh(Use.PAGE, experiment.sequences),
-        body or Body.block(setup.box.size, nodes),
+        sampled,
+        None if sampled.grid is None else sampled.over(setup.geometry),
         experiment.cleaner.allowing(setup.tool.radius),
         experiment.shaft,
         points,
@@ -106,7 +136,8 @@ def measured_points(
     cloud: FloatArray,
     rng: np.random.Generator,
 ) -> tuple[FloatArray, int, FloatArray]:
-    """Return the points of a sample, the number of those on the top, and points near each vertex.
+    """Return the points of a sample, the number of those on the part of the surface that is seen
+    from above, and points near each point of the body.
 
     Args:
         recorder: the settings.
@@ -115,15 +146,14 @@ def measured_points(
         cloud: (n, 3) segmented points [m], camera frame.
         rng: draws the points that are kept.
 
-    Returns points (p, 3) [m] in the phantom frame, those of the top first; the number of points on
-    the top; and the number of points near each material point (v,).
+    Returns points (p, 3) [m] in the phantom frame, those seen from above first; the number of
+    these; and the number of points near each point of the body (v,).
     """
     if len(cloud) > recorder.points:
         cloud = cloud[np.sort(rng.choice(len(cloud), recorder.points, replace=False))]
     points, body = camera.place(cloud), recorder.body
     _, nearest = cKDTree(body.surface(frame.move(body.rest))).query(points)
-    height = body.rest[:, 2].max()
-    upper = body.surface(body.rest)[nearest, 2] >= height * (1 - 1e-6)
+    upper = recorder.upper[nearest]
     near = np.zeros(len(body.rest))
     np.add.at(near, body.corners[nearest], body.shares[nearest])
     return points[np.argsort(~upper, kind="stable")], int(upper.sum()), near

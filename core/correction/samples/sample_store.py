@@ -3,11 +3,13 @@
 samples/
   samples.json       origin of the samples, splits, and numbers of samples
   body.npz           the material points, see `palpate.correction.samples.corrected_points`
+  chart.npz          those over the top, of a body with a grid
   <sequence>/
-    positions.npy    (n, v, 3) simulated positions of the points [m]
+    positions.npy    (n, r, 3) simulated positions of the points of both [m]
     tool.npy         (n, 13) tool: position [m], quaternion, velocity [m/s], force [N]
-    points.npy       (n, p, 3) measured points [m], those of the top first; NaN beyond their number
-    count.npy        (n, 2) number of points of the top, and of all points
+    points.npy       (n, p, 3) measured points [m], those seen from above first; NaN beyond
+                     their number
+    count.npy        (n, 2) number of points seen from above, and of all points
     time.npy         (n,) cloud stamp [s]
     frame.npy        (n,) number of the cloud
     probe.npy        (n,) number of the push, from 1; 0 where the tool is clear of the block
@@ -33,9 +35,9 @@ from palpate.correction.samples.sample_arrays import ARRAYS
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError, RunError
 
-__all__ = ["FORMAT", "Batch", "Samples", "open_samples"]
+__all__ = ["FORMAT", "Batch", "Samples", "body_for", "open_samples", "save_bodies"]
 
-FORMAT = 1
+FORMAT, BODY, CHART = 2, "body.npz", "chart.npz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,7 @@ class Batch:
     """A batch of samples, see the module.
 
     Attributes:
-        positions: (b, v, 3) simulated positions [m].
+        positions: (b, r, 3) simulated positions [m].
         tool: (b, 13) tool.
         points: (b, p, 3) measured points [m].
         count: (b, 2) numbers of points.
@@ -76,11 +78,13 @@ class Samples:
         folder: the folder.
         about: content of samples.json.
         body: the material points.
+        chart: those over the top; None for a body without a grid.
     """
 
     folder: Path
     about: dict[str, Any]
     body: Body
+    chart: Body | None = None
 
     @property
     def sequences(self) -> tuple[str, ...]:
@@ -98,7 +102,7 @@ class Samples:
 
     @cached_property
     def seen(self) -> FloatArray:
-        """Mean number of measured points per frame near each material point (v,).
+        """Mean number of measured points per frame near each material point (r,).
 
         Zero where the camera never sees the surface.
         """
@@ -166,8 +170,8 @@ def open_samples(folder: Path) -> Samples:
     """Open complete samples; RunError for anything else."""
     try:
         about = json.loads((folder / "samples.json").read_text())
-        with np.load(folder / "body.npz") as arrays:
-            body = Body.from_arrays({**arrays, "grid": about["grid"], "flat": False})
+        body = _read_body(folder / BODY)
+        chart = _read_body(folder / CHART) if (folder / CHART).is_file() else None
     except (OSError, ValueError, KeyError) as error:
         raise RunError(
             f"{folder} holds no samples ({error}); make them first", path=str(folder)
@@ -178,4 +182,33 @@ def open_samples(folder: Path) -> Samples:
             "make them again",
             path=str(folder),
         )
-    return Samples(folder, about, body)
+    return Samples(folder, about, body, chart)
+
+
+def body_for(samples: Samples, kind: str) -> Body:
+    """Return the points that a network of this kind corrects.
+
+    Raises CorrectionError for a network over the top of a body without a grid.
+    """
+    if kind != "unet2d":
+        return samples.body
+    if samples.chart is None:
+        raise CorrectionError(
+            "only a body with a grid has a grid over its top; take kind graph for other meshes",
+            key="kind",
+        )
+    return samples.chart
+
+
+def save_bodies(folder: Path, body: Body, chart: Body | None) -> None:
+    """Write the material points of samples, and those over the top if there are any."""
+    for name, one in ((BODY, body), (CHART, chart)):
+        if one is not None:
+            arrays = one.to_arrays()
+            np.savez(folder / name, **{**arrays, "grid": np.array(arrays["grid"] or [], dtype=int)})
+
+
+def _read_body(path: Path) -> Body:
+    with np.load(path) as arrays:
+        grid = arrays["grid"].tolist()
+        return Body.from_arrays({**arrays, "grid": grid or None})

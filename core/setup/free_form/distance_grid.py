@@ -10,7 +10,7 @@ from scipy.ndimage import map_coordinates
 
 from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["DistanceGrid"]
+__all__ = ["DistanceGrid", "scene_of"]
 
 _MARGIN = 0.02
 """How far the grid reaches beyond the surface [m]."""
@@ -53,10 +53,10 @@ class DistanceGrid:
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(np.float32)
         corners = o3d.core.Tensor.from_numpy(grid)
         distances = np.asarray(
-            _scene(vertices, triangles).compute_signed_distance(corners).numpy(), dtype=float
+            scene_of(vertices, triangles).compute_signed_distance(corners).numpy(), dtype=float
         )
         if part is not None:
-            apart = _scene(vertices, part).compute_distance(corners).numpy()
+            apart = scene_of(vertices, part).compute_distance(corners).numpy()
             distances = np.where(distances < 0, -apart, apart)
         return cls(low, step, distances)
 
@@ -68,8 +68,8 @@ class DistanceGrid:
         return np.asarray(near + self.step * np.linalg.norm(places - inside, axis=1))
 
 
-def _scene(vertices: FloatArray, triangles: IntArray) -> Any:
-    """Open3D's scene of a surface."""
+def scene_of(vertices: FloatArray, triangles: IntArray) -> Any:
+    """Open3D's scene of a surface of vertices (v, 3) [m] and triangles (t, 3)."""
     import open3d as o3d
 
     scene = o3d.t.geometry.RaycastingScene()

@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.errors import MeshError
+from palpate.setup.free_form.column_heights import heights_above
 from palpate.setup.free_form.distance_grid import DistanceGrid
 from palpate.setup.free_form.fixed_region import Faces, FixedRegion, Plane
 from palpate.setup.free_form.shape_surface import ShapeSurface
@@ -171,20 +172,30 @@ class Shape(Geometry):
         """Vertices [m] and triangles as stated, see `Geometry.closed_surface`."""
         return self.vertices, self.triangles
 
-    def surface_points(self) -> FloatArray:
-        """Rest positions (m, 3) [m] spread evenly over the free surface; the same at every call."""
+    def surface_points(self, counts: tuple[int, int, int] | None = None) -> FloatArray:
+        """Rest positions (m, 3) [m] spread evenly over the free surface, see
+        `Geometry.surface_points`.
+        """
+        count = _SAMPLES
+        if counts is not None:
+            nx, ny, nz = counts
+            count = max(count, nx * ny + 2 * (nx + ny - 2) * (nz - 1))
         corners = self.corners[~self.held]
         areas = np.linalg.norm(
             np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
         ).cumsum()
-        step = np.arange(_SAMPLES) + 0.5
-        chosen = np.searchsorted(areas, step / _SAMPLES * areas[-1])
+        step = np.arange(count) + 0.5
+        chosen = np.searchsorted(areas, step / count * areas[-1])
         # Two irrational steps fill the square evenly (Roberts 2018). Points beyond its diagonal are
         # folded back.
         shares = np.stack([step * 0.7548776662466927, step * 0.5698402909980532], axis=1) % 1.0
         shares = np.where(shares.sum(axis=1, keepdims=True) > 1, 1 - shares, shares)
         weights = np.concatenate([1 - shares.sum(axis=1, keepdims=True), shares], axis=1)
         return np.asarray(np.einsum("mk,mki->mi", weights, corners[chosen]))
+
+    def heights(self, places: FloatArray) -> FloatArray:
+        """Height (m,) [m] of the surface above each place, see `Geometry.heights`."""
+        return heights_above(self.vertices, self.triangles, places, self.surface_points())
 
     def surface(
         self,

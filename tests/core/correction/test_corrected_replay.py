@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from shapes import dome
 
 from palpate.correction import Body, Corrector, NetworkSpec, TrainedNetwork, build, replay_corrected
 from palpate.correction.corrected_replay import FEEDBACKS
@@ -14,11 +15,14 @@ from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.model import BlockModel
 from palpate.foundation.errors import CorrectionError
 from palpate.mesh.box_mesh import GridSpec, box_mesh
+from palpate.mesh.gmsh_fill import TetSpec
 from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
 
 SIZE, NODES = (0.0687, 0.0393, 0.0358), (13, 5, 5)
-SETUP = Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
+BLOCK = Box(size=SIZE)
+SETUP = Setup(geometry=BLOCK, tool=Tool(radius=5e-3))
+DOME = Setup(geometry=dome((0.03, 0.024, 0.0255)), tool=Tool(radius=5e-3))
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
 WAY = np.array([[0.004, 0.0, SIZE[2] + 5e-3 - depth] for depth in (1e-3, 2e-3, 3e-3)])
 TOOLS = np.concatenate([WAY, np.tile([1.0, *[0.0] * 9], (3, 1))], axis=1)
@@ -26,12 +30,13 @@ TOOLS = np.concatenate([WAY, np.tile([1.0, *[0.0] * 9], (3, 1))], axis=1)
 
 def _trained(kind, body=None, **about):
     """Return an untrained network whose last layer is not zero."""
-    body = body or (Body.top(SIZE, NODES) if kind == "unet2d" else Body.block(SIZE, NODES))
+    whole = Body.of(BLOCK, NODES)
+    body = body or (whole.over(BLOCK) if kind == "unet2d" else whole)
     network = build(NetworkSpec(kind=kind, features=(4, 6)), body)
     torch.manual_seed(0)
     for parameter in network.inside.last.parameters():
         torch.nn.init.normal_(parameter, std=0.2)
-    seen = np.where(np.isclose(Body.block(SIZE, NODES).rest[:, 2], SIZE[2]), 5.0, 0.0)
+    seen = np.where(np.isclose(Body.of(BLOCK, NODES).rest[:, 2], SIZE[2]), 5.0, 0.0)
     return TrainedNetwork(
         network.eval(), body, {"force": "simulated", "seen": seen.tolist(), **about}
     )
@@ -164,3 +169,46 @@ def test_network_on_a_mesh_corrects_frames_of_that_mesh_only(frames):
 def test_unknown_feedback_is_refused():
     with pytest.raises(CorrectionError, match="follow"):
         Corrector(_trained("unet2d"), SETUP, feedback="loud")  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def pushed_dome():
+    centres = np.array([[0.004, 0.0, 0.0305 - depth] for depth in (1e-3, 2.5e-3)])
+    mesh = TetSpec.along(centres, 5e-3, spacing=3e-3, coarsest=4e-3)
+    return replay(DOME, centres, mesh, tolerance=1e-3)[-1]
+
+
+@pytest.mark.parametrize("kind", ["unet2d", "unet3d", "graph"])
+def test_frame_of_a_dome_is_moved_as_the_network_moves_its_sampled_surface(kind, pushed_dome):
+    body = Body.of(DOME.geometry, (6, 5, 4))
+    if kind == "unet2d":
+        body = body.over(DOME.geometry)
+    corrector = Corrector(_trained(kind, body), DOME, half=False)
+    expected = corrector.correction(pushed_dome, TOOLS[-1])[body.count :]
+    corrected = corrector.correct(pushed_dome, TOOLS[-1])
+    places = body.rest[body.count :]
+    # Next to the base the dome is steep, and the height of its top changes within an element.
+    high = places[:, 2] > 6e-3
+    places, expected = places[high], expected[high]
+    moved = corrected.move(places) - pushed_dome.move(places)
+    # The mesh's elements are smaller than the grid's voxels.
+    assert np.sqrt(np.mean((moved - expected) ** 2)) < 0.1 * np.sqrt(np.mean(expected**2))
+    assert np.sqrt(np.mean(expected**2)) > 1e-4
+
+
+def test_inside_of_a_dome_follows_its_corrected_surface(pushed_dome):
+    body = Body.of(DOME.geometry, (6, 5, 4)).over(DOME.geometry)
+    still, follows = (
+        Corrector(_trained("unet2d", body), DOME, feedback=kind).correct(pushed_dome, TOOLS[-1])
+        for kind in ("none", "follow")
+    )
+    deep = np.array([[0.004, 0.0, 8e-3], [0.01, 0.005, 5e-3]])
+    top = DOME.geometry.surface_points()
+    top = top[top[:, 2] > 0.02]
+    moved = [np.abs(one.move(deep) - pushed_dome.move(deep)).max() for one in (still, follows)]
+    assert moved[0] < 0.1 * moved[1] and moved[1] > 1e-5
+    assert np.sqrt(np.mean((still.move(top) - follows.move(top)) ** 2)) < 0.3 * np.sqrt(
+        np.mean((still.move(top) - pushed_dome.move(top)) ** 2)
+    )
+    base = follows.mesh.connectivity.base_nodes
+    assert np.allclose(follows.displacement[base], 0.0, atol=1e-9)

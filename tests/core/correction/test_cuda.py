@@ -22,7 +22,7 @@ from palpate.correction import (
 )
 from palpate.correction.networks.chamfer import nearest
 from palpate.correction.networks.devices import reproducible
-from palpate.correction.training_run import body_for
+from palpate.correction.samples.sample_store import body_for
 from palpate.foundation.errors import Cancelled
 
 pytestmark = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA here")

@@ -25,7 +25,13 @@ def _dragged(folder: Path, setup: Setup) -> None:
         deep = 3e-3 if 0.2 < share < 0.8 else -20e-3
         place = back.apply(
             np.array(
-                [[0.015 * (share - 0.5) / 0.6, 0.002, setup.box.size[2] + setup.tool.radius - deep]]
+                [
+                    [
+                        0.015 * (share - 0.5) / 0.6,
+                        0.002,
+                        setup.geometry.height + setup.tool.radius - deep,
+                    ]
+                ]
             )
         )[0]
         moved.append(",".join([time, *(f"{value:.7f}" for value in place), *turn]))

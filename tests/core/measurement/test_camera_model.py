@@ -89,7 +89,7 @@ def test_offset_is_a_motion_of_the_camera_but_for_its_share_of_the_distance():
 def _rest_cloud(setup: Setup, true: CameraModel) -> FloatArray:
     """Raw cloud (n, 3) [m] of the true block on its table, without noise."""
     table = np.random.default_rng(9).uniform(-0.09, 0.09, (9000, 3)) * [1.0, 1.0, 0.0]
-    half = np.array(setup.box.size[:2]) / 2
+    half = np.array(setup.geometry.size[:2]) / 2
     table = table[(np.abs(table[:, :2]) > half + 6e-3).any(axis=1)]
     return true.read(np.concatenate([*(_side(name) * setup.scale for name in SIDES), table]))
 

@@ -17,7 +17,7 @@ from palpate.replay.replay import replay, rest
 from palpate.setup.setup import Box, Detachment, Load, Setup, Support
 
 GRADING = Grading(spacing=1.5e-3, along=0.7, inward=1.2)
-SIZE = SETUP.box.size
+SIZE = SETUP.geometry.size
 PLACES = {
     "amid the top": (0.0, 0.0, SIZE[2]),
     "near a corner": (0.03, -0.015, SIZE[2]),
@@ -152,7 +152,7 @@ def test_the_sag_does_not_depend_on_the_focus_of_the_mesh():
     """
     heavy, points = (
         replace(SETUP, load=Load(specific_weight_over_stiffness=1.8)),
-        SETUP.box.surface_points(),
+        SETUP.geometry.surface_points(),
     )
 
     def sag(grading: Grading, place: tuple[float, float, float]) -> FloatArray:
@@ -185,7 +185,7 @@ def test_mesh_is_finer_where_a_loose_base_begins_to_be_held_and_there_alone(
     above = np.array([0.0, 0.0, 0.04])
     plain, finer = (REPLAY_GRID.mesh(setup, above) for setup in (stated, loose))
     sign = -1 if edge[0] == "-" else 1
-    line = sign * (stated.box.size[axis] / 2 - 0.013)
+    line = sign * (stated.geometry.size[axis] / 2 - 0.013)
     for number, (ends, more) in enumerate(zip(plain.axes, finer.axes, strict=True)):
         if number != axis:
             assert more == pytest.approx(ends)

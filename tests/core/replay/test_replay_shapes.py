@@ -19,7 +19,7 @@ from palpate.replay.replay import Replay, replay, require_converged
 from palpate.setup.free_form.fixed_region import Painted
 from palpate.setup.setup import Detachment, Load, Material, Setup, Shape, Support, Tool
 
-BOX = SETUP.box.size
+BOX = SETUP.geometry.size
 RADII = (0.03, 0.022, 0.02)
 DOME = Setup(geometry=dome(RADII), tool=Tool(radius=5e-3), mass=0.05)
 

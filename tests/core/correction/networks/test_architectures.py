@@ -1,23 +1,26 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
-from shapes import filled_box
+from shapes import dome, filled_box
 from torch import nn
 
 from palpate.correction import Body, NetworkSpec, build
 from palpate.correction.networks.unet import PaddedConvolution, UNet, max_pool, max_pool_by_halves
 from palpate.correction.networks.unet_inference import UNetInference
 from palpate.foundation.errors import CorrectionError
+from palpate.setup.box import Box
 
 SIZE = (0.0687, 0.0393, 0.0358)
+BLOCK, DOME = Box(size=SIZE), dome((0.04, 0.03, 0.025))
 SMALL = (4, 6, 8)
 GRIDS = [(13, 5, 5), (25, 9, 9), (4, 3, 2)]
 KINDS = ["unet2d", "unet3d", "graph"]
 
 
 def _body(kind, nodes):
-    return Body.top(SIZE, nodes) if kind == "unet2d" else Body.block(SIZE, nodes)
+    return Body.of(BLOCK, nodes).over(BLOCK) if kind == "unet2d" else Body.of(BLOCK, nodes)
 
 
 def _with_output(spec, body):
@@ -63,7 +66,7 @@ def test_untrained_network_does_not_change_the_simulation(kind):
 
 
 def test_unet_of_the_paper_has_its_layers():
-    inside = build(NetworkSpec(kind="unet2d"), Body.top(SIZE, (13, 5, 5))).inside
+    inside = build(NetworkSpec(kind="unet2d"), Body.of(BLOCK, (13, 5, 5)).over(BLOCK)).inside
     assert isinstance(inside, UNet)
     widths = [
         [part.weight.shape[0] for part in block.modules() if isinstance(part, PaddedConvolution)]
@@ -146,7 +149,7 @@ def test_graph_network_works_on_tetrahedra():
 
 
 def test_graph_network_does_not_depend_on_the_numbering_of_nodes():
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     order = torch.randperm(len(body.rest), generator=torch.Generator().manual_seed(3))
     place = torch.argsort(order)
     turned = Body(
@@ -190,7 +193,7 @@ def test_fast_inference_gives_the_same_correction(kind, nodes):
 
 
 def test_weights_depend_on_the_seed_only():
-    body = Body.top(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2)).over(BLOCK)
     first = build(NetworkSpec(features=SMALL), body, seed=4)
     torch.rand(7)
     second, other = (
@@ -221,9 +224,25 @@ def test_invalid_specification_is_refused(wrong, message):
 
 def test_network_for_another_body_is_refused():
     with pytest.raises(CorrectionError, match="2 axes"):
-        build(NetworkSpec(kind="unet2d"), Body.block(SIZE, (4, 3, 2)))
+        build(NetworkSpec(kind="unet2d"), Body.of(BLOCK, (4, 3, 2)))
 
 
 def test_spec_survives_json():
     spec = NetworkSpec(kind="graph", features=(3, 5), trust=0.25, inputs=("pose", "force"))
     assert NetworkSpec.from_json(spec.to_json()) == spec
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_surface_of_a_dome_follows_the_correction_of_the_grid(kind):
+    body = Body.of(DOME, (5, 4, 3))
+    if kind == "unet2d":
+        body = body.over(DOME)
+    network = _with_output(NetworkSpec(kind=kind, features=SMALL), body).eval()
+    vertices, tool = _inputs(body, frames=1)
+    with torch.no_grad():
+        moved = (network(vertices, tool) - vertices)[0].numpy()
+    assert np.allclose(body.carry(moved[: body.count]), moved, atol=1e-6)
+    assert np.abs(moved[body.count :]).max() > 1e-3
+    if kind != "graph":
+        single = UNetInference(network, half=False)(vertices[0], tool[0]) - vertices[0]
+        assert np.allclose(single.numpy(), moved, atol=1e-6)

@@ -15,6 +15,7 @@ from palpate.replay.replay import rest
 from palpate.setup.setup import Box, Setup, Tool
 
 SIZE = (0.0687, 0.0393, 0.0358)
+BLOCK = Box(size=SIZE)
 NODES = (13, 5, 5)
 
 
@@ -52,7 +53,7 @@ def test_both_nearest_neighbour_searches_are_exact(seed):
 
 
 def test_chamfer_is_the_papers_metric():
-    body, setup = Body.block(SIZE, NODES), Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
+    body, setup = Body.of(BLOCK, NODES), Setup(geometry=Box(size=SIZE), tool=Tool(radius=5e-3))
     batch = _cloud(body)
     apart, valid = SurfaceLoss(body, _seen(body)).distances(batch.positions, batch)
     frame = rest(setup, GridSpec(nodes=(5, 4, 3)))
@@ -62,7 +63,7 @@ def test_chamfer_is_the_papers_metric():
 
 
 def test_top_layer_is_compared_with_points_of_the_top_only():
-    body = Body.top(SIZE, NODES)
+    body = Body.of(BLOCK, NODES).over(BLOCK)
     batch = _cloud(body)
     batch.count[:, 0] = 5
     _, valid = SurfaceLoss(body, np.ones(len(body.rest))).distances(batch.positions, batch)
@@ -71,7 +72,7 @@ def test_top_layer_is_compared_with_points_of_the_top_only():
 
 @pytest.mark.parametrize("distance", ["chamfer", "symmetric", "hausdorff"])
 def test_gradient_is_that_of_finite_differences(distance):
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     batch = _cloud(body)
     loss = SurfaceLoss(body, _seen(body), distance=distance, hold=0.5)
     vertices = batch.positions.clone().requires_grad_()
@@ -83,7 +84,7 @@ def test_gradient_is_that_of_finite_differences(distance):
 
 
 def test_hausdorff_is_scipys():
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     batch = _cloud(body, frames=1)
     loss = SurfaceLoss(body, np.ones(len(body.rest)), distance="hausdorff", hold=0.0)
     surface = body.surface(body.rest)
@@ -95,7 +96,7 @@ def test_hausdorff_is_scipys():
 
 
 def test_symmetric_distance_adds_visible_surface_to_points():
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     batch = _cloud(body)
     one, both = (
         SurfaceLoss(body, _seen(body), distance=kind)(
@@ -112,7 +113,7 @@ def test_symmetric_distance_adds_visible_surface_to_points():
 
 
 def test_hidden_points_are_held_and_visible_ones_are_free():
-    body = Body.block(SIZE, NODES)
+    body = Body.of(BLOCK, NODES)
     batch, seen = _cloud(body), _seen(body)
     loss = SurfaceLoss(body, seen, hold=1.0)
     hidden, shown = batch.positions.clone(), batch.positions.clone()
@@ -131,7 +132,7 @@ def test_points_without_measurements_have_full_weight():
 
 
 def test_frame_without_points_has_a_finite_loss_and_gradient():
-    body = Body.block(SIZE, (4, 3, 2))
+    body = Body.of(BLOCK, (4, 3, 2))
     batch = _cloud(body)
     batch.count[1] = 0
     for distance in ("chamfer", "symmetric", "hausdorff"):
@@ -144,4 +145,4 @@ def test_frame_without_points_has_a_finite_loss_and_gradient():
 
 def test_unknown_distance_is_refused():
     with pytest.raises(CorrectionError, match="hausdorff"):
-        SurfaceLoss(Body.block(SIZE, (4, 3, 2)), np.ones(24), distance="manhattan")  # type: ignore[arg-type]
+        SurfaceLoss(Body.of(BLOCK, (4, 3, 2)), np.ones(24), distance="manhattan")  # type: ignore[arg-type]

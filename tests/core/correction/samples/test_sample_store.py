@@ -5,7 +5,7 @@ import pytest
 from learned_samples import write_samples
 from scipy.spatial.transform import Rotation
 
-from palpate.correction import Body, make_samples, open_samples, recorder_for
+from palpate.correction import Body, body_for, make_samples, open_samples, recorder_for
 from palpate.correction.samples.tool_columns import canonical_quaternions, tool_columns
 from palpate.dataset import Kinematics, Sequence
 from palpate.dataset.tool_smoothing import smooth_centres
@@ -117,8 +117,8 @@ def test_samples_of_an_arbitrary_mesh_are_its_nodes(bench, tmp_path):
     samples = make_samples(tmp_path / "samples", recorder, sequences=["poke-top-01"], every=10)
     assert samples.body.grid is None
     assert samples.batch(np.arange(2)).positions.shape == (2, 60, 3)
-    with pytest.raises(CorrectionError, match="top layer"):
-        _ = samples.body.upper
+    with pytest.raises(CorrectionError, match="take kind graph"):
+        body_for(samples, "unet2d")
 
 
 def test_batches_are_read_in_the_requested_order(tmp_path):

@@ -100,7 +100,7 @@ def test_sensor_that_is_never_clear_is_refused() -> None:
 
 def test_lumps_are_looked_for_below_the_pushes_and_within_the_body() -> None:
     places = np.array([[0.0, 0.0, 0.03], [0.002, 0.0, 0.03], [0.02, 0.0, 0.03]])
-    found = inclusions_under(places, np.tile([0.0, 0.0, 1.0], (3, 1)), SETUP.box)
+    found = inclusions_under(places, np.tile([0.0, 0.0, 1.0], (3, 1)), SETUP.geometry)
     assert [(lump.x, round(0.03 - lump.z, 6)) for lump in found] == [
         (x, depth) for x in (0.0, 0.02) for depth in CRITERIA.inclusion_grid.depths
     ]
