@@ -78,6 +78,10 @@ class Geometry(ABC):
             distances (m,) [m], negative inside, and unit normals (m, 3).
         """
 
+    def outward(self, points: FloatArray) -> FloatArray:
+        """Outward unit normals (m, 3) of the free surface next to points (m, 3) [m]."""
+        return self.facing(points)[1]
+
     @abstractmethod
     def outside(self, points: FloatArray) -> FloatArray:
         """Signed distance (m,) [m] of points (m, 3) [m] to the whole surface, base included,

@@ -141,6 +141,18 @@ class Shape(Geometry):
             np.einsum("mi,mi->m", points - places, normals) < 0, -distance, distance
         ), normals
 
+    def outward(self, points: FloatArray) -> FloatArray:
+        """Outward normals (m, 3) next to points (m, 3) [m], see `Geometry.outward`."""
+        from palpate.setup.free_form.closest_point import nearest
+
+        number, _ = nearest(np.ascontiguousarray(points, float), self._free_corners)
+        return np.asarray(self._normals[~self.held][number])
+
+    @cached_property
+    def _free_corners(self) -> FloatArray:
+        """Corners (f, 3, 3) of the triangles that are not held [m]."""
+        return np.ascontiguousarray(self.corners[~self.held])
+
     @cached_property
     def _normals(self) -> FloatArray:
         """Outward unit normals (t, 3)."""

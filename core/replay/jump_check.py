@@ -1,0 +1,87 @@
+"""Criteria by which an equilibrium that was found in a jump of the tool is doubted, and checked.
+
+A ball that is pressed deep at once may come to rest in another equilibrium than by way of the
+places between: thin tissue over a held floor folds, or is left beside the ball. Contact pushes and
+never pulls; and where the jump met difficulties, its equilibrium must be that of small steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.fem.continuation import FREE_STEP
+from palpate.fem.model import ToolSphere
+from palpate.fem.newton import Outcome
+from palpate.foundation.arrays import FloatArray
+from palpate.replay.equilibrium import Equilibrium
+from palpate.setup.phantom_geometry import Geometry
+
+__all__ = ["agree", "is_doubtful", "parts_between", "pulls"]
+
+_CHECKED_STEP = 0.5 * FREE_STEP
+"""Longest step of the way by which a jump is checked [m]."""
+_PULL = 0.5
+"""Share of the force by which it may point into the body [1]: beside an edge the nearest normal is
+not the one along which the tool was pressed."""
+_AGREED = 0.05
+"""Largest difference of the forces, and of the displacements, of two ways to one equilibrium [1].
+Contact at more points (`BlockModel`) alone makes one of a few hundredths on a rough mesh."""
+
+
+def pulls(geometry: Geometry, frame: Equilibrium) -> bool:
+    """Whether the body pulls a tool without friction inwards, which pressure cannot.
+
+    Args:
+        geometry: of the body.
+        frame: to be judged; its force is compared with the outward normal of the free surface at
+            rest that is nearest to the tool's centre.
+    """
+    size = float(np.linalg.norm(frame.force))
+    if not size:
+        return False
+    centre = frame.tool.centre - np.append(frame.slip, 0.0)
+    return float(frame.force @ geometry.outward(centre[None])[0]) < -_PULL * size
+
+
+def is_doubtful(start: Equilibrium, frame: Equilibrium) -> bool:
+    """Whether a frame after a jump is to be checked by small steps, or sought by them.
+
+    It is where no equilibrium was found, or only at many more contact points than before.
+
+    Args:
+        start: frame at the start of the jump.
+        frame: that was found.
+    """
+    was_dense = start.dense and start.in_contact
+    return frame.outcome not in (Outcome.CONVERGED, Outcome.BASE_IN_TOOL) or (
+        frame.dense and not was_dense
+    )
+
+
+def parts_between(before: ToolSphere, tool: ToolSphere, finer: int = 1) -> list[ToolSphere]:
+    """Places of the tool on the way from `before` to `tool`, the last of them `tool` itself.
+
+    There are none where the way is no longer than one step.
+
+    Args:
+        before: tool at the start.
+        tool: tool at the end.
+        finer: factor on the number of steps.
+    """
+    way: FloatArray = tool.centre - before.centre
+    length = float(np.linalg.norm(way))
+    if length <= FREE_STEP:
+        return []
+    parts = finer * int(np.ceil(length / _CHECKED_STEP))
+    shares = np.arange(1, parts) / parts
+    return [*(ToolSphere(before.centre + share * way, tool.radius) for share in shares), tool]
+
+
+def agree(one: Equilibrium, other: Equilibrium) -> bool:
+    """Whether two frames with the tool at one place are the same equilibrium."""
+    pairs = [(one.force, other.force)]
+    if one.mesh is other.mesh:
+        pairs.append((one.displacement, other.displacement))
+    return all(
+        np.linalg.norm(first - second) <= _AGREED * np.linalg.norm(first) for first, second in pairs
+    )
