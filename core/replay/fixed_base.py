@@ -257,7 +257,7 @@ class FixedBaseReplay:
         self._use_similar = self._use_similar or self._quick_solver.failing
         solution = self._with_permanent_set(model, local, solution)
         frame = self._equilibrium(solution, model.mesh, tool)
-        if solution.converged and pulls(self.setup.geometry, frame):
+        if solution.converged and pulls(frame):
             return replace(frame, outcome=Outcome.PULLED)
         return frame
 

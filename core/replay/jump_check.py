@@ -7,14 +7,17 @@ never pulls; and where the jump met difficulties, its equilibrium must be that o
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numba import njit
 
 from palpate.fem.continuation import FREE_STEP
+from palpate.fem.mesh_quadrature import surface_quadrature
 from palpate.fem.model import ToolSphere
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
 from palpate.replay.equilibrium import Equilibrium
-from palpate.setup.phantom_geometry import Geometry
 
 __all__ = ["agree", "is_doubtful", "parts_between", "pulls"]
 
@@ -28,19 +31,48 @@ _AGREED = 0.05
 Contact at more points (`BlockModel`) alone makes one of a few hundredths on a rough mesh."""
 
 
-def pulls(geometry: Geometry, frame: Equilibrium) -> bool:
+def pulls(frame: Equilibrium) -> bool:
     """Whether the body pulls a tool without friction inwards, which pressure cannot.
 
-    Args:
-        geometry: of the body.
-        frame: to be judged; its force is compared with the outward normal of the free surface at
-            rest that is nearest to the tool's centre.
+    The force is compared with the outward normal of the free surface at rest that is nearest to the
+    tool's centre.
     """
     size = float(np.linalg.norm(frame.force))
     if not size:
         return False
+    mesh, face = frame.mesh, frame.mesh.connectivity.element.face
     centre = frame.tool.centre - np.append(frame.slip, 0.0)
-    return float(frame.force @ geometry.outward(centre[None])[0]) < -_PULL * size
+    places = surface_quadrature(mesh, face).places
+    outward = _outward(places, mesh.connectivity.surface, mesh.nodes, face.gradients, centre)
+    return float(frame.force @ outward) < -_PULL * size
+
+
+@njit(cache=True)
+def _outward(places: Any, surface: Any, nodes: Any, gradients: Any, centre: Any) -> Any:
+    """Unit normal (3,) of a surface at the one of its points that is nearest to a centre.
+
+    Args:
+        places: (f, p, 3) of the points [m].
+        surface: (f, b) nodes of the sides.
+        nodes: (n, 3) [m].
+        gradients: (p, b, 2) of the shape functions at the points.
+        centre: (3,) [m].
+    """
+    nearest, side, point = np.inf, 0, 0
+    for f in range(places.shape[0]):
+        for q in range(places.shape[1]):
+            square = 0.0
+            for i in range(3):
+                square += (places[f, q, i] - centre[i]) ** 2
+            if square < nearest:
+                nearest, side, point = square, f, q
+    s, t = np.zeros(3), np.zeros(3)
+    for a in range(surface.shape[1]):
+        for i in range(3):
+            s[i] += gradients[point, a, 0] * nodes[surface[side, a], i]
+            t[i] += gradients[point, a, 1] * nodes[surface[side, a], i]
+    normal = np.cross(s, t)
+    return normal / np.linalg.norm(normal)
 
 
 def is_doubtful(start: Equilibrium, frame: Equilibrium) -> bool:

@@ -78,9 +78,11 @@ class Geometry(ABC):
             distances (m,) [m], negative inside, and unit normals (m, 3).
         """
 
-    def outward(self, points: FloatArray) -> FloatArray:
-        """Outward unit normals (m, 3) of the free surface next to points (m, 3) [m]."""
-        return self.facing(points)[1]
+    def facing_free(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed distance to the free surface, and its normal next to each point, as `facing`
+        gives them for the surface with what is held.
+        """
+        return self.facing(points)
 
     @abstractmethod
     def outside(self, points: FloatArray) -> FloatArray:

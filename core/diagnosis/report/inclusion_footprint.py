@@ -102,7 +102,7 @@ def footprint_of(
         * inclusion.radius
     )
     flat = middle[0] + reach[:, None] * _directions(normal[0])
-    distance, out = geometry.facing(flat)
+    distance, out = geometry.facing_free(flat)
     return Footprint(
         middle[0], normal[0], flat - distance[:, None] * out, float(change.max()), depth
     )
@@ -153,13 +153,13 @@ def _rings(
     flat = np.concatenate(
         [middle[None], *(middle + ring * radius * directions for ring in CRITERIA.footprint.rings)]
     )
-    distance, out = evaluator.problem.setup.geometry.facing(flat)
+    distance, out = evaluator.problem.setup.geometry.facing_free(flat)
     return flat - distance[:, None] * out, out
 
 
 def _on_surface(evaluator: Evaluator, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Places of the free surface (m, 3) [m] nearest to points in the body, and its normals."""
-    distance, normals = evaluator.problem.setup.geometry.facing(points)
+    distance, normals = evaluator.problem.setup.geometry.facing_free(points)
     return points - distance[:, None] * normals, normals
 
 
@@ -192,7 +192,7 @@ def depth_of(
     own = slice(at, at + len(effect.numbers()))
     drawn = [effect.at(row.tolist()) for row in _drawn(evaluator, model, own)]
     balls = [ball for one in (effect, *drawn) if (ball := one.inclusion) is not None]
-    depths = -evaluator.problem.setup.geometry.facing(
+    depths = -evaluator.problem.setup.geometry.facing_free(
         np.array([[ball.x, ball.y, ball.z] for ball in balls])
     )[0]
     covers = depths - np.array([ball.radius for ball in balls])
