@@ -145,8 +145,9 @@ def _stored(store: Path) -> dict[int, Trial]:
 def _append(store: Path, trial: Trial) -> None:
     entry = {**asdict(trial), "outcomes": [outcome.name for outcome in trial.outcomes]}
     store.parent.mkdir(parents=True, exist_ok=True)
+    cut_off = store.exists() and not store.read_bytes().endswith(b"\n")
     with store.open("a") as file:
-        file.write(json.dumps(entry) + "\n")
+        file.write("\n" * cut_off + json.dumps(entry) + "\n")
 
 
 def _table(trials: Iterable[Trial]) -> tuple[Table, bool]:
