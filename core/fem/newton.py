@@ -57,6 +57,13 @@ class Outcome(Enum):
         "the push was given up, for it takes more work than any push may; "
         "look at its first frame without equilibrium"
     )
+    PULLED = (
+        "the body came to rest on the wrong side of the tool and pulls it, which contact cannot"
+    )
+    STEPS_DIFFER = (
+        "a long motion at once ends in an equilibrium that small steps do not reach; "
+        "move the tool in smaller steps"
+    )
 
     @property
     def code(self) -> int:

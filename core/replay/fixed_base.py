@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -16,6 +17,7 @@ from palpate.mesh.default_meshes import meshing_for
 from palpate.mesh.protocol import Mesh, Meshing
 from palpate.replay.equilibrium import Equilibrium, extrapolated, predict_from_similar
 from palpate.replay.friction_step import FrictionState, solve_with_friction
+from palpate.replay.jump_check import agree, is_doubtful, parts_between, pulls
 from palpate.replay.material_history import MaterialHistory, ReplayState
 from palpate.replay.work_budget import WorkBudget
 from palpate.setup.setup import Setup
@@ -153,13 +155,71 @@ class FixedBaseReplay:
                 self.model(start.mesh), start.mesh.nodes + start.displacement
             )
             return self._equilibrium(solution, start.mesh, tool)
+        frame = self._solve_or_densify(tool, local, start)
+        if is_doubtful(start, frame):
+            frame = self._checked(self.approach_start(start, local), local, start, frame)
+        self._before = (start, frame)
+        return frame
+
+    def _solve_or_densify(
+        self, tool: ToolSphere, local: ToolSphere, start: Equilibrium
+    ) -> Equilibrium:
+        """Solve for the equilibrium under the tool, at more contact points if there is none.
+
+        Args as in `_solve_contact`.
+        """
         frame = self._solve_contact(tool, local, start)
         if frame.outcome not in (Outcome.CONVERGED, Outcome.BASE_IN_TOOL) and not self.dense:
             # Most likely the tool slipped in between the contact points, which smaller steps would
             # not prevent.
             self.dense = True
             frame = self._solve_contact(tool, local, start)
-        self._before = (start, frame)
+        return frame
+
+    def _checked(
+        self, before: ToolSphere, local: ToolSphere, start: Equilibrium, found: Equilibrium
+    ) -> Equilibrium:
+        """Check a frame that was found in a jump by small steps, or seek it by them.
+
+        Args:
+            before: tool at the start of the jump, in the frame of the block.
+            local: tool at its end, in the frame of the block.
+            start: frame to begin from.
+            found: the frame at the end of the jump.
+
+        Returns:
+            `found` if steps lead to the same equilibrium; theirs if steps of half the length do;
+                else the frame without equilibrium.
+        """
+        known = [found] if found.outcome is Outcome.CONVERGED else []
+        for finer in (1, 2):
+            parts = parts_between(before, local, finer)
+            if not parts:
+                return found
+            frame = self._in_steps(parts, start)
+            if frame.outcome is not Outcome.CONVERGED:
+                break
+            if (same := next((one for one in known if agree(one, frame)), None)) is not None:
+                self.dense = same.dense
+                return same
+            known.append(frame)
+        self.dense = found.dense
+        return replace(found, outcome=Outcome.STEPS_DIFFER) if known else found
+
+    def _in_steps(self, parts: Sequence[ToolSphere], start: Equilibrium) -> Equilibrium:
+        """Solve at places of the tool in the frame of the block, one after another.
+
+        Returns:
+            the last frame, or the first one without equilibrium.
+        """
+        self._before, frame, slip = None, start, np.append(self.slip, 0.0)
+        for place in parts:
+            self.dense = frame.dense and frame.in_contact
+            last, tool = frame, ToolSphere(place.centre + slip, place.radius)
+            frame = self._solve_or_densify(tool, place, last)
+            self._before = (last, frame)
+            if frame.outcome is not Outcome.CONVERGED:
+                break
         return frame
 
     def _solve_contact(
@@ -195,7 +255,11 @@ class FixedBaseReplay:
             haste=not self.dense,
         )
         self._use_similar = self._use_similar or self._quick_solver.failing
-        return self._equilibrium(self._with_permanent_set(model, local, solution), model.mesh, tool)
+        solution = self._with_permanent_set(model, local, solution)
+        frame = self._equilibrium(solution, model.mesh, tool)
+        if solution.converged and pulls(frame):
+            return replace(frame, outcome=Outcome.PULLED)
+        return frame
 
     def initial_state(
         self, tool: ToolSphere, start: Equilibrium

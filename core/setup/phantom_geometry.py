@@ -87,6 +87,12 @@ class Geometry(ABC):
             distances (m,) [m], negative inside, and unit normals (m, 3).
         """
 
+    def facing_free(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed distance to the free surface, and its normal next to each point, as `facing`
+        gives them for the surface with what is held.
+        """
+        return self.facing(points)
+
     @abstractmethod
     def outside(self, points: FloatArray) -> FloatArray:
         """Signed distance (m,) [m] of points (m, 3) [m] to the whole surface, base included,

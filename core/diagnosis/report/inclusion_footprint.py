@@ -105,7 +105,7 @@ def footprint_of(
         * inclusion.radius
     )
     flat = middle[0] + reach[:, None] * _directions(normal[0])
-    distance, out = geometry.facing(flat)
+    distance, out = geometry.facing_free(flat)
     return Footprint(
         middle[0], normal[0], flat - distance[:, None] * out, float(change.max()), depth
     )
@@ -156,13 +156,13 @@ def _rings(
     flat = np.concatenate(
         [middle[None], *(middle + ring * radius * directions for ring in CRITERIA.footprint.rings)]
     )
-    distance, out = evaluator.problem.setup.geometry.facing(flat)
+    distance, out = evaluator.problem.setup.geometry.facing_free(flat)
     return flat - distance[:, None] * out, out
 
 
 def _on_surface(evaluator: Evaluator, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Places of the free surface (m, 3) [m] nearest to points in the body, and its normals."""
-    distance, normals = evaluator.problem.setup.geometry.facing(points)
+    distance, normals = evaluator.problem.setup.geometry.facing_free(points)
     return points - distance[:, None] * normals, normals
 
 
@@ -198,7 +198,7 @@ def depth_of(
     drawn = [effect.at(row.tolist()) for row in _drawn(evaluator, model, own)]
     lumps = [lump for one in (effect, *drawn) if (lump := one.lump(problem.setup)) is not None]
     middles = np.array([felt_middle(np.array(lump.polyline), problem.pushes[0]) for lump in lumps])
-    depths = -problem.setup.geometry.facing(middles)[0]
+    depths = -problem.setup.geometry.facing_free(middles)[0]
     covers = depths - np.array([lump.radius for lump in lumps])
     return _interval(depths), _interval(np.maximum(covers, 0.0))
 

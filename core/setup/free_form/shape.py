@@ -135,14 +135,16 @@ class Shape(Geometry):
         Returns:
             distances (m,) [m], negative inside, and unit normals (m, 3).
         """
-        from palpate.setup.free_form.closest_point import nearest
+        return _facing(points, self.corners, self._normals)
 
-        number, places = nearest(np.ascontiguousarray(points, float), self.corners)
-        normals = self._normals[number]
-        distance = np.linalg.norm(points - places, axis=1)
-        return np.where(
-            np.einsum("mi,mi->m", points - places, normals) < 0, -distance, distance
-        ), normals
+    def facing_free(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Signed distance to the free surface and its normals, see `Geometry.facing_free`."""
+        return _facing(points, self._free_corners, self._normals[~self.held])
+
+    @cached_property
+    def _free_corners(self) -> FloatArray:
+        """Corners (f, 3, 3) of the triangles that are not held [m]."""
+        return np.ascontiguousarray(self.corners[~self.held])
 
     @cached_property
     def _normals(self) -> FloatArray:
@@ -240,3 +242,15 @@ def load_shape(path: Path, *, scale: float = 1.0, fixed: FixedRegion | None = No
     """
     vertices, triangles = read_surface(path, scale)
     return Shape(vertices, triangles, fixed or Plane(), path.name)
+
+
+def _facing(
+    points: FloatArray, corners: FloatArray, normals: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Signed distance (m,) [m] to triangles (t, 3, 3), and the normal (m, 3) next to each point."""
+    from palpate.setup.free_form.closest_point import nearest
+
+    number, places = nearest(np.ascontiguousarray(points, float), corners)
+    distance = np.linalg.norm(points - places, axis=1)
+    inside = np.einsum("mi,mi->m", points - places, normals[number]) < 0
+    return np.where(inside, -distance, distance), normals[number]
