@@ -19,6 +19,8 @@ LARGEST_FILE = 2**25
 """Bytes of a surface's file: 600 000 triangles in a binary STL. Reading takes 16 times as much."""
 _FLAT = 1e-9
 """Height of a triangle over its longest side below which it has no area [1]."""
+_STL_HEAD, _STL_TRIANGLE = 80, 50
+"""Bytes of a binary STL before the number of its triangles, and of each triangle."""
 _SMALLEST, _LARGEST = 1e-3, 2.0
 """Smallest and largest extent of a phantom along any axis [m]: as for a block."""
 
@@ -63,6 +65,8 @@ def load_triangles(path: Path, largest: int = LARGEST_FILE) -> tuple[FloatArray,
             value=size,
             high=largest,
         )
+    if path.suffix.lower() == ".stl":
+        _check_stl(path, size)
     import trimesh
 
     try:
@@ -76,14 +80,40 @@ def load_triangles(path: Path, largest: int = LARGEST_FILE) -> tuple[FloatArray,
         raise MeshError(
             f"{path.name}: cannot be read as a surface ({error}); export it anew", file=str(path)
         ) from error
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(vertices):
+        raise MeshError(
+            f"{path.name}: a triangle names vertex {triangles.max()}, of {len(vertices)} from 0; "
+            "expected a vertex of the file: export it anew",
+            file=str(path),
+        )
+    _check_finite(path.name, vertices.reshape(-1, 3))
     return vertices.reshape(-1, 3), triangles.reshape(-1, 3)
+
+
+def _check_stl(path: Path, size: int) -> None:
+    """Check that a file is an STL of text, or a binary one of the length that its head states."""
+    with path.open("rb") as file:
+        head = file.read(_STL_HEAD + 4)
+    if head.lstrip().startswith(b"solid") and b"\0" not in head:
+        return
+    count = int.from_bytes(head[_STL_HEAD:], "little") if len(head) == _STL_HEAD + 4 else 0
+    expected = _STL_HEAD + 4 + _STL_TRIANGLE * count
+    if len(head) < _STL_HEAD + 4 or size != expected:
+        told = f"a binary STL of {count} triangles has {expected}" if count else "no STL begins so"
+        raise MeshError(
+            f"{path.name}: cannot be read as a surface: the file has {size} bytes, {told}; it was "
+            "cut off or is something else: export it anew",
+            file=str(path),
+            value=size,
+            expected=expected,
+        )
 
 
 def merge_vertices(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
     """Merge equal vertices, in the order of their first appearance."""
     order = np.lexsort(vertices.T)
     new = np.ones(len(order), bool)
-    new[1:] = (np.diff(vertices[order], axis=0) != 0).any(axis=1)
+    new[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
     # lexsort is stable, so that the first of equal vertices comes first.
     first = np.empty_like(order)
     first[order] = order[new][np.cumsum(new) - 1]
@@ -120,13 +150,7 @@ def _at(place: FloatArray) -> str:
     return "(" + ", ".join(f"{value:.4f}" for value in place) + ") m"
 
 
-def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None:
-    if not len(triangles):
-        raise MeshError(
-            f"{name}: holds no triangle ({len(vertices)} vertices); expected a closed surface",
-            file=name,
-            triangles=0,
-        )
+def _check_finite(name: str, vertices: FloatArray) -> None:
     broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(broken):
         raise MeshError(
@@ -137,6 +161,17 @@ def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None
             count=len(broken),
             vertex=int(broken[0]),
         )
+
+
+def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+    if not len(triangles):
+        raise MeshError(
+            f"{name}: holds no triangle ({len(vertices)} vertices); expected a closed surface: "
+            "export it with its faces",
+            file=name,
+            triangles=0,
+        )
+    _check_finite(name, vertices)
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise MeshError(
             f"{name}: a triangle names vertex {triangles.max()} of {len(vertices)}; export it anew",

@@ -70,14 +70,6 @@ def load_surface(path: Path, unit: str) -> tuple[TriangleSurface, int]:
             "export it with its faces",
             file=path.name,
         )
-    broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
-    if len(broken):
-        raise MeshError(
-            f"{path.name}: {len(broken)} of {len(vertices)} vertices are not finite, the first is "
-            f"number {broken[0]}: {vertices[broken[0]].tolist()}; export it anew",
-            file=path.name,
-            vertex=int(broken[0]),
-        )
     places, merged = merge_vertices(UNITS[unit] * vertices, triangles)
     surface = TriangleSurface(places, merged, path.name)
     return surface, len(vertices) - len(places)
