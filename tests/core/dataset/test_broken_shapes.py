@@ -19,7 +19,7 @@ from palpate.setup.surface_repair.surface_summary import summarize
 
 _TODO = re.compile(
     r"export it|add it|remove|correct|name |rename|close it|repair|flip|make the normals|keep one"
-    r"|move|expected (one of|a 4x4|a plain|this file)|write|decimate|plain file"
+    r"|move|expected (one of|a 4x4|a plain|this file)|write|decimate|copy|plain file"
 )
 
 
