@@ -17,6 +17,7 @@ from palpate.app.commands import (
     evaluation,
     export,
     service,
+    surface,
     sweeping,
     training,
 )
@@ -38,6 +39,7 @@ app = typer.Typer(
 )
 app.command()(demo.demo)
 app.command()(data.check)
+app.command()(surface.surface)
 app.command()(data.register)
 app.command()(data.replay)
 app.command()(diagnosis.diagnose)

@@ -15,8 +15,8 @@ from benchmarks.cpu_time import timed
 from benchmarks.reference_pokes import SETUP, compared, poke_centres, poke_frames, reference
 from benchmarks.replay import RATE, motion
 from palpate.mesh.box_mesh import GridSpec
-from palpate.mesh.gmsh_fill import TetSpec
 from palpate.mesh.protocol import Meshing
+from palpate.mesh.tet_fill import TetSpec
 from palpate.replay.replay import replay, require_converged
 from palpate.setup.setup import Setup, Shape
 

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.mesh.gmsh_fill import TetSpec, fill
+from palpate.mesh.tet_fill import TetSpec, fill
 from palpate.mesh.tet_mesh import TetMesh
 from palpate.setup.free_form.fixed_region import FixedRegion, Plane
 from palpate.setup.setup import Shape

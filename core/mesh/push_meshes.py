@@ -14,8 +14,8 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
-from palpate.mesh.gmsh_fill import TetSpec, check_spacing, fill
 from palpate.mesh.protocol import FINER
+from palpate.mesh.tet_fill import TetSpec, check_spacing, fill
 from palpate.mesh.tet_mesh import TetMesh, stretched
 from palpate.setup.free_form.closest_point import nearest
 from palpate.setup.free_form.shape import Shape

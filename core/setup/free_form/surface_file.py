@@ -10,12 +10,24 @@ from scipy.sparse.csgraph import connected_components
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError
+from palpate.setup.free_form.triangle_crossings import crossing_pairs
 
-__all__ = ["FORMATS", "check_surface", "read_numbered_surface", "read_surface"]
+__all__ = [
+    "FORMATS",
+    "check_surface",
+    "load_triangles",
+    "merge_vertices",
+    "read_numbered_surface",
+    "read_surface",
+]
 
 FORMATS = (".stl", ".ply", ".obj")
 LARGEST_FILE = 2**25
 """Bytes of a surface's file: 600 000 triangles in a binary STL. Reading takes 16 times as much."""
+_FLAT = 1e-9
+"""Height of a triangle over its longest side below which it has no area [1]."""
+_STL_HEAD, _STL_TRIANGLE = 80, 50
+"""Bytes of a binary STL before the number of its triangles, and of each triangle."""
 _SMALLEST, _LARGEST = 1e-3, 2.0
 """Smallest and largest extent of a phantom along any axis [m]: as for a block."""
 
@@ -37,6 +49,17 @@ def read_numbered_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, I
     """Read a file like `read_surface`; the third result (n,) is the vertex that each of the file's
     vertices became.
     """
+    vertices, triangles = load_triangles(path)
+    merged, numbers = _merged(scale * vertices)
+    return merged, numbers[triangles], numbers
+
+
+def load_triangles(path: Path, largest: int = LARGEST_FILE) -> tuple[FloatArray, IntArray]:
+    """Load vertices (v, 3) and triangles (t, 3) as they stand in a file.
+
+    Raises MeshError for another format, a missing file, one with more bytes than `largest`, or one
+    that cannot be read.
+    """
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
             f"{path.name}: a surface is read from {', '.join(FORMATS)}, "
@@ -49,14 +72,17 @@ def read_numbered_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, I
             file=str(path),
         )
     size = path.stat().st_size
-    if size > LARGEST_FILE:
+    if size > largest:
+        smaller = f": {remedy(path.name, '--tolerance MM')}" if size <= 4 * largest else ""
         raise MeshError(
-            f"{path.name}: has {size / 2**20:.0f} MiB, at most {LARGEST_FILE / 2**20:.0f} are "
-            "read: decimate it; meshes for simulation need less than 100 000 triangles",
+            f"{path.name}: has {size / 2**20:.0f} MiB, at most {largest / 2**20:.0f} are "
+            "read: decimate it; meshes for simulation need less than 100 000 triangles" + smaller,
             file=str(path),
             value=size,
-            high=LARGEST_FILE,
+            high=largest,
         )
+    if path.suffix.lower() == ".stl":
+        _check_stl(path, size)
     import trimesh
 
     try:
@@ -70,8 +96,33 @@ def read_numbered_surface(path: Path, scale: float = 1.0) -> tuple[FloatArray, I
         raise MeshError(
             f"{path.name}: cannot be read as a surface ({error}); export it anew", file=str(path)
         ) from error
-    merged, numbers = _merged(scale * vertices.reshape(-1, 3))
-    return merged, numbers[triangles.reshape(-1, 3)], numbers
+    if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(vertices):
+        raise MeshError(
+            f"{path.name}: a triangle names vertex {triangles.max()}, of {len(vertices)} from 0; "
+            "expected a vertex of the file: export it anew",
+            file=str(path),
+        )
+    _check_finite(path.name, vertices.reshape(-1, 3))
+    return vertices.reshape(-1, 3), triangles.reshape(-1, 3)
+
+
+def _check_stl(path: Path, size: int) -> None:
+    """Check that a file is an STL of text, or a binary one of the length that its head states."""
+    with path.open("rb") as file:
+        head = file.read(_STL_HEAD + 4)
+    if head.lstrip().startswith(b"solid") and b"\0" not in head:
+        return
+    count = int.from_bytes(head[_STL_HEAD:], "little") if len(head) == _STL_HEAD + 4 else 0
+    expected = _STL_HEAD + 4 + _STL_TRIANGLE * count
+    if len(head) < _STL_HEAD + 4 or size != expected:
+        told = f"a binary STL of {count} triangles has {expected}" if count else "no STL begins so"
+        raise MeshError(
+            f"{path.name}: cannot be read as a surface: the file has {size} bytes, {told}; it was "
+            "cut off or is something else: export it anew",
+            file=str(path),
+            value=size,
+            expected=expected,
+        )
 
 
 def merge_vertices(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
@@ -82,11 +133,19 @@ def merge_vertices(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArra
 
 def _merged(vertices: FloatArray) -> tuple[FloatArray, IntArray]:
     """Different vertices in the order of their first appearance, and the number of each vertex."""
-    _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return vertices[first[order]], rank[inverse.ravel()]
+    order = np.lexsort(vertices.T)
+    new = np.ones(len(order), bool)
+    new[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
+    # lexsort is stable, so that the first of equal vertices comes first.
+    first = np.empty_like(order)
+    first[order] = order[new][np.cumsum(new) - 1]
+    kept = first == np.arange(len(order))
+    return vertices[kept], (np.cumsum(kept) - 1)[first]
+
+
+def remedy(name: str, options: str) -> str:
+    """Sentence on the command that repairs a file."""
+    return f"`palpate surface {name} {options} --out FILE` does it"
 
 
 def check_surface(name: str, vertices: FloatArray, triangles: IntArray) -> None:
@@ -113,13 +172,7 @@ def _at(place: FloatArray) -> str:
     return "(" + ", ".join(f"{value:.4f}" for value in place) + ") m"
 
 
-def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None:
-    if not len(triangles):
-        raise MeshError(
-            f"{name}: holds no triangle ({len(vertices)} vertices); expected a closed surface",
-            file=name,
-            triangles=0,
-        )
+def _check_finite(name: str, vertices: FloatArray) -> None:
     broken = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(broken):
         raise MeshError(
@@ -130,6 +183,17 @@ def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None
             count=len(broken),
             vertex=int(broken[0]),
         )
+
+
+def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None:
+    if not len(triangles):
+        raise MeshError(
+            f"{name}: holds no triangle ({len(vertices)} vertices); expected a closed surface: "
+            "export it with its faces",
+            file=name,
+            triangles=0,
+        )
+    _check_finite(name, vertices)
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise MeshError(
             f"{name}: a triangle names vertex {triangles.max()} of {len(vertices)}; export it anew",
@@ -140,10 +204,23 @@ def _check_numbers(name: str, vertices: FloatArray, triangles: IntArray) -> None
     if len(flat):
         raise MeshError(
             f"{name}: {len(flat)} of {len(triangles)} triangles have a corner twice, "
-            f"the first is number {flat[0]}; expected triangles with an area: remove them",
+            f"the first is number {flat[0]}; expected triangles with an area: remove them, "
+            f"{remedy(name, '--clean')}",
             file=name,
             count=len(flat),
             triangle=int(flat[0]),
+        )
+    sides = vertices[np.roll(triangles, -1, axis=1)] - vertices[triangles]
+    across = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    line = np.flatnonzero(across <= _FLAT * np.einsum("tki,tki->tk", sides, sides).max(axis=1))
+    if len(line):
+        raise MeshError(
+            f"{name}: {len(line)} of {len(triangles)} triangles have no area, their corners lie "
+            f"on a line, the first is number {line[0]} at {_at(vertices[triangles[line[0], 0]])}; "
+            f"expected triangles with an area: remove them, {remedy(name, '--clean')}",
+            file=name,
+            count=len(line),
+            triangle=int(line[0]),
         )
 
 
@@ -193,7 +270,8 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
         raise MeshError(
             f"{name}: is open: {len(lone)} of {len(ends)} edges belong to one triangle only, "
             f"around {len(names)} hole(s), the largest of {sizes.max()} edges at "
-            f"{_at(vertices[largest].mean(axis=0))}; expected a closed surface: close it",
+            f"{_at(vertices[largest].mean(axis=0))}; expected a closed surface: close it, "
+            f"{remedy(name, '--close-base')}, or --fill-holes MM",
             file=name,
             open_edges=len(lone),
             holes=len(names),
@@ -205,7 +283,8 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
         raise MeshError(
             f"{name}: {len(shared)} edges belong to more than two triangles, "
             f"the first at {_at(place)}; expected a surface without "
-            "inner walls or doubled triangles: remove them",
+            f"inner walls or doubled triangles: remove them, {remedy(name, '--clean')}, "
+            "or --rebuild MM",
             file=name,
             edges=len(shared),
             place=place.tolist(),
@@ -239,7 +318,8 @@ def _check_winding(
         shown = ", ".join(f"{size:.3g}" for size in sizes[:3])
         raise MeshError(
             f"{name}: holds {bodies} separate surfaces (the largest enclose {shown} cm3); "
-            "expected one body without cavities: keep one of them, or join them",
+            "expected one body without cavities: keep one of them, or join them, "
+            f"{remedy(name, '--body 1')}, or --rebuild MM",
             file=name,
             bodies=bodies,
         )
@@ -259,7 +339,8 @@ def _check_winding(
         raise MeshError(
             f"{name}: {len(flipped)} of {count} triangles are flipped against the rest, "
             f"the first is number {flipped[0]} at {_at(place)}; "
-            "expected all to turn outwards: make the normals consistent",
+            "expected all to turn outwards: make the normals consistent, "
+            f"{remedy(name, '--orient')}",
             file=name,
             flipped=len(flipped),
             triangle=int(flipped[0]),
@@ -269,7 +350,7 @@ def _check_winding(
     if volume <= 0:
         raise MeshError(
             f"{name}: all {count} triangles turn inwards (volume {1e6 * volume:.3g} cm3); "
-            "expected outwards: flip the normals",
+            f"expected outwards: flip the normals, {remedy(name, '--orient')}",
             file=name,
             flipped=count,
             volume=volume,
@@ -283,21 +364,15 @@ def _volume(vertices: FloatArray, triangles: IntArray) -> float:
 
 
 def _check_crossings(name: str, vertices: FloatArray, triangles: IntArray) -> None:
-    import open3d as o3d
-
-    # Open3D's tests use absolute tolerances made for bodies of size one.
-    spread = (vertices - vertices.mean(axis=0)) / np.ptp(vertices, axis=0).max()
-    mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(spread), o3d.utility.Vector3iVector(triangles.astype(np.int32))
-    )
-    pairs = np.asarray(mesh.get_self_intersecting_triangles())
+    pairs = crossing_pairs(vertices, triangles)
     if len(pairs):
         one, other = (int(number) for number in pairs[0])
         place = vertices[triangles[one]].mean(axis=0)
         raise MeshError(
             f"{name}: {len(pairs)} pairs of triangles cross, the first are numbers {one} and "
             f"{other} "
-            f"at {_at(place)}; expected a surface that does not cut itself: repair it there",
+            f"at {_at(place)}; expected a surface that does not cut itself: repair it there, or "
+            f"draw it anew: {remedy(name, '--rebuild MM')}",
             file=name,
             crossings=len(pairs),
             triangles=[one, other],

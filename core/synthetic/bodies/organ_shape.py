@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.mesh.gmsh_fill import TetSpec, fill
+from palpate.mesh.tet_fill import TetSpec, fill
 from palpate.setup.setup import Shape
 from palpate.synthetic.solver.tet_block import (
     TetBlock,

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from palpate.foundation.arrays import FloatArray, IntArray
-from palpate.mesh.gmsh_fill import TetSpec, fill
+from palpate.mesh.tet_fill import TetSpec, fill
 from palpate.setup.free_form.closest_point import nearest
 from palpate.setup.free_form.shape import Shape
 from palpate.synthetic.bench.motion_plan import PlannedPush

@@ -12,8 +12,8 @@ from palpate.effects.geometry import GeometryScale
 from palpate.fem.history.voxel_points import VoxelPoints
 from palpate.fem.mesh_quadrature import element_quadrature
 from palpate.foundation.arrays import FloatArray
-from palpate.mesh.gmsh_fill import TetSpec
 from palpate.mesh.push_meshes import SCREEN_PUSHES
+from palpate.mesh.tet_fill import TetSpec
 from palpate.replay.replay import replay, require_converged
 from palpate.setup.setup import Material, Relaxation, Setup, Tool
 

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 SCRIPT = """
 import os
-from palpate.mesh.gmsh_fill import _gmsh
+from palpate.mesh.meshers.gmsh_mesher import _gmsh
 with _gmsh():
     pass
 read, write = os.pipe()

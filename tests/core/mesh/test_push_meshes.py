@@ -7,8 +7,8 @@ import pytest
 from shapes import dome
 
 from palpate.foundation.errors import MeshError
-from palpate.mesh.gmsh_fill import TetSpec
 from palpate.mesh.push_meshes import REPLAY_PUSHES, SCREEN_PUSHES, PushMeshSpec
+from palpate.mesh.tet_fill import TetSpec
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Setup, Tool
 

@@ -12,7 +12,7 @@ from shapes import box_surface, dome, filled_box
 
 from palpate.foundation.errors import MeshError, SetupError
 from palpate.mesh.box_mesh import GridSpec
-from palpate.mesh.gmsh_fill import TetSpec, fill
+from palpate.mesh.tet_fill import TetSpec, _filled, fill
 from palpate.setup.free_form.fixed_region import Faces
 from palpate.setup.setup import Box, Detachment, Setup, Shape, Support, Tool
 
@@ -59,7 +59,7 @@ def test_same_surface_and_motion_give_the_same_mesh():
     spec = TetSpec.along(TOUCH, 5e-3, spacing=2e-3)
     first = fill(SETUP.stated_shape, spec)
     assert fill(Shape(*box_surface(SIZE)), TetSpec.along(TOUCH + 1e-5, 5e-3, spacing=2e-3)) is first
-    fill.cache_clear()
+    _filled.cache_clear()
     again = fill(SETUP.stated_shape, spec)
     assert (
         again is not first
@@ -120,6 +120,7 @@ def test_gmsh_leaves_signal_handlers_alone_and_no_model_behind():
 
 
 def test_missing_gmsh_is_reported_with_what_to_install(monkeypatch):
+    monkeypatch.setenv("PALPATE_MESHER", "gmsh")
     monkeypatch.setitem(sys.modules, "gmsh", None)
     with pytest.raises(SetupError, match=r'meshed by Gmsh.*pip install "palpate\[shapes\]"'):
         fill(SETUP.stated_shape, TetSpec(path=(), radius=1e-3, spacing=7.7e-3, coarsest=7.7e-3))
@@ -129,7 +130,7 @@ def test_failure_of_gmsh_is_reported_with_the_file(monkeypatch):
     def broken(*_):
         raise RuntimeError("no elements in volume 1")
 
-    monkeypatch.setattr("palpate.mesh.gmsh_fill._build", broken)
+    monkeypatch.setattr("palpate.mesh.meshers.gmsh_mesher._build", broken)
     with pytest.raises(
         MeshError, match=r"^surface: Gmsh found no tetrahedra .*no elements in volume 1.*0.0066 m"
     ):

@@ -13,7 +13,7 @@ from benchmarks.reference_pokes import SETUP, compared, reference
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray
 from palpate.gradients.displacement_changes import displacement_changes
-from palpate.mesh.gmsh_fill import TetSpec
+from palpate.mesh.tet_fill import TetSpec
 from palpate.replay.mesh_convergence import mesh_errors
 from palpate.replay.replay import Replay, replay, require_converged
 from palpate.setup.free_form.fixed_region import Painted

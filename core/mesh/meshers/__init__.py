@@ -1,0 +1,1 @@
+"""Meshers that fill closed surfaces with tetrahedra."""
