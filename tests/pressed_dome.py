@@ -15,7 +15,7 @@ from palpate.dataset import Dataset, open_dataset
 from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.mesh.gmsh_fill import TetSpec
+from palpate.mesh.tet_fill import TetSpec
 from palpate.replay.equilibrium import Equilibrium
 from palpate.replay.replay import replay
 from palpate.setup.setup import Setup, Tool

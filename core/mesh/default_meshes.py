@@ -10,11 +10,11 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import BoxMesh, GridSpec, block_size
-from palpate.mesh.gmsh_fill import TetSpec
 from palpate.mesh.graded_mesh import FINE_GRID, PAGE_GRID, REPLAY_GRID, SCREEN_GRID, Grading
 from palpate.mesh.grid_axes import even_axis
 from palpate.mesh.protocol import Mesh, Meshing
 from palpate.mesh.push_meshes import FINE_PUSHES, REPLAY_PUSHES, SCREEN_PUSHES, PushMeshSpec
+from palpate.mesh.tet_fill import TetSpec
 from palpate.setup.phantom_geometry import CLEARANCE, Geometry
 
 if TYPE_CHECKING:

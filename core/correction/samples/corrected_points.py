@@ -86,7 +86,7 @@ class Body:
         apart, known = cKDTree(self.rest).query(grid.points)
         fresh = apart > _SAME
         numbers = np.where(fresh, len(self.rest) + np.cumsum(fresh) - 1, known)
-        surface = self.count + np.flatnonzero(seen) if len(made.carriers) else []
+        surface = self.count + np.flatnonzero(seen) if len(made.carriers) else np.zeros(0, int)
         return replace(made, index=np.concatenate([numbers, surface]).astype(np.int64))
 
     @classmethod

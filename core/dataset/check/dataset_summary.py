@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.dataset.check.motion_coverage import CoverageGap, coverage_gaps
-from palpate.dataset.check.plausibility import implausible_values
+from palpate.dataset.check.plausibility import frame_notes, implausible_values
 from palpate.dataset.folder import Dataset
 from palpate.dataset.sequence import Sequence
 from palpate.dataset.tool_motion import ToolMotion, describe_motion
@@ -185,6 +185,7 @@ def _doubts(dataset: Dataset) -> list[str]:
         doubts.append(
             "no sequence is kept for the test, so no gain can be shown: name one in splits.test"
         )
+    doubts += [f"dataset.toml: {text}" for text in frame_notes(dataset.config)]
     doubts += [
         f"dataset.toml: {text}" for text in implausible_values(dataset.config, dataset.geometry)
     ]

@@ -7,7 +7,7 @@ import numpy as np
 from palpate.dataset.schema import DatasetConfig
 from palpate.setup.phantom_geometry import Geometry
 
-__all__ = ["implausible_values"]
+__all__ = ["frame_notes", "implausible_values"]
 
 DENSITY = 300.0, 3000.0
 """Least and largest density [kg/m^3]: foams have 300, gels, silicone and tissue 900 to 1400, filled
@@ -68,3 +68,17 @@ def implausible_values(config: DatasetConfig, body: Geometry) -> list[str]:
             "surface?"
         )
     return doubts
+
+
+def frame_notes(config: DatasetConfig) -> list[str]:
+    """Return a sentence where the phantom was turned or lifted to stand upright on z = 0."""
+    turn = config.phantom_from_file
+    if np.array_equal(turn.matrix, np.eye(4)):
+        return []
+    angle = float(np.degrees(np.linalg.norm(turn.rotation_vector)))
+    lift = 1e3 * float(turn.translation[2])
+    return [
+        f"the surface is turned by {angle:.1f} degrees and lifted by {lift:.1f} mm, so that up is "
+        "z and its lowest point lies in z = 0: places in results are in that frame, to which "
+        "phantom_from_file leads from the frame of the files"
+    ]

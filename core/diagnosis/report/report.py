@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import beta
 
 from palpate.dataset import Dataset
-from palpate.dataset.check.plausibility import implausible_values
+from palpate.dataset.check.plausibility import frame_notes, implausible_values
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
@@ -188,6 +188,7 @@ def report_of(
     return {
         "format": 1,
         "dataset": dataset.name,
+        **_frame(dataset),
         "verdict": verdict,
         "causes": causes,
         **({"family": family} if (family := _family(findings, trials)) else {}),
@@ -204,9 +205,16 @@ def report_of(
         "evidence": _evidence(evaluator, findings, checks),
         "warnings": [
             *implausible_values(dataset.config, dataset.geometry),
+            *frame_notes(dataset.config),
             *_warnings(evaluator, findings, checks),
         ],
     }
+
+
+def _frame(dataset: Dataset) -> dict[str, Any]:
+    """The turn to the upright frame of all places here; empty where the files are in it."""
+    turn = dataset.config.phantom_from_file.matrix
+    return {} if np.array_equal(turn, np.eye(4)) else {"phantom_from_file": turn.tolist()}
 
 
 def _evidence(evaluator: Evaluator, findings: Findings, checks: AllClearChecks) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from palpate.dataset.tool_smoothing import smooth_centres
 from palpate.fem.model import BlockModel
 from palpate.foundation.errors import CorrectionError
 from palpate.mesh.box_mesh import GridSpec, box_mesh
-from palpate.mesh.gmsh_fill import TetSpec
+from palpate.mesh.tet_fill import TetSpec
 from palpate.replay.replay import replay
 from palpate.setup.setup import Box, Setup, Tool
 

@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 from shapes import box_surface, write_felt_shape
 
 from palpate.dataset import Dataset, open_dataset
+from palpate.dataset.check import check_dataset
+from palpate.dataset.check.plausibility import frame_notes
 from palpate.foundation.arrays import BoolArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.frames import Transform
@@ -64,6 +66,8 @@ def test_phantom_is_turned_upright_with_all_that_is_stated(
     assert body.low[2] == pytest.approx(0.0, abs=1e-6)
     assert body.height == pytest.approx(SIZE[2], abs=1e-6)
     assert _held(dataset).sum() == 2
+    (note,) = frame_notes(dataset.config)
+    assert note in " ".join(check_dataset(dataset, Transform()).warnings)
     # Touches are in the robot's frame, which is that of the upright block here.
     found = register(dataset)
     assert found.touch_rms < 1e-6
@@ -76,6 +80,7 @@ def test_phantom_is_turned_upright_with_all_that_is_stated(
 def test_upright_phantom_on_the_table_stays_where_its_file_puts_it(tmp_path: Path) -> None:
     dataset = open_dataset(write_felt_shape(tmp_path, *box_surface(SIZE)))
     np.testing.assert_array_equal(dataset.config.phantom_from_file.matrix, np.eye(4))
+    assert not frame_notes(dataset.config)
 
 
 @pytest.mark.parametrize(
