@@ -26,6 +26,10 @@ class TetMesher(Protocol):
         """Its name, for readers and for the setting, in which case does not matter."""
 
     @property
+    def package(self) -> str:
+        """The package that it is installed with."""
+
+    @property
     def is_there(self) -> bool:
         """Whether it is installed."""
 
