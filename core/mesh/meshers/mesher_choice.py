@@ -21,6 +21,8 @@ SETTING = "PALPATE_MESHER"
 class TetMesher(Protocol):
     """A mesher; equal ones make equal meshes."""
 
+    def __hash__(self) -> int: ...
+
     @property
     def name(self) -> str:
         """Its name, for readers and for the setting, in which case does not matter."""
