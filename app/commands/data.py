@@ -21,6 +21,7 @@ from palpate.app.commands.console import (
     print_warnings,
     progress,
 )
+from palpate.app.commands.mesh_report import print_mesh
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DatasetError, PalpateError, RegistrationError
 from palpate.foundation.progress import part
@@ -242,6 +243,8 @@ def _check_one(path: Path, picture: Path | None) -> None:
         )
     _print_summary(dataset, summary, registration)
     print_warnings((*summary.warnings, *warnings))
+    if registration is not None and not dataset.geometry.is_block:
+        print_mesh(dataset, registration)
     if picture is not None and registration is not None:
         from palpate.dataset.check.coverage_figure import coverage_picture
 

@@ -77,8 +77,10 @@ def diagnose(
     """Find the causes of the simulation's error in each dataset, and what they gain on sequences
     that nothing was fitted on.
     """
+    from palpate.app.storage.disk_usage import keep_meshes
     from palpate.app.storage.registration_store import accepted_for
 
+    keep_meshes(runs)
     several = len(datasets) > 1
     _refuse_place(file, run, several)
     _refuse_broken(datasets)

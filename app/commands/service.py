@@ -48,6 +48,7 @@ def serve(
     """Serve the page and the REST service on one port."""
     from palpate.app.main import create_app
     from palpate.app.server.serve import serve as run
+    from palpate.app.storage.disk_usage import keep_meshes
 
     settings = Settings(
         host=host,
@@ -65,6 +66,8 @@ def serve(
             highlight=False,
             soft_wrap=True,
         )
+    runs.mkdir(parents=True, exist_ok=True)
+    keep_meshes(runs)
     run(create_app(settings), settings.host, settings.port, announce)
 
 

@@ -13,10 +13,13 @@ from palpate.app.storage.dataset_import import UPLOADS
 from palpate.app.storage.run_store import EXPORTS
 from palpate.app.storage.sweep_store import REPLAY_CACHE, SWEEPS
 from palpate.app.storage.training_store import SAMPLE_CACHE, TRAININGS
+from palpate.mesh.meshers.mesh_cache import FOLDER
 
-__all__ = ["CACHES", "Disk", "Usage", "size_of"]
+__all__ = ["CACHES", "Disk", "Usage", "keep_meshes", "size_of"]
 
-CACHES = (f"{SWEEPS}/{REPLAY_CACHE}", f"{TRAININGS}/{SAMPLE_CACHE}", UPLOADS, EXPORTS)
+MESHES = ".meshes"
+"""Folder below the runs of the meshes of shapes."""
+CACHES = (f"{SWEEPS}/{REPLAY_CACHE}", f"{TRAININGS}/{SAMPLE_CACHE}", UPLOADS, EXPORTS, MESHES)
 """Folders below the runs whose content can be computed, or uploaded, again."""
 
 
@@ -68,6 +71,14 @@ class Disk:
 
     def _cached(self) -> list[tuple[Path, int, float]]:
         return [file for folder in CACHES for file in _files(self._runs / folder)]
+
+
+def keep_meshes(runs: Path) -> None:
+    """Store the meshes of shapes below the runs folder, for this process and all that it starts;
+    nothing where there is no such folder.
+    """
+    if runs.is_dir():
+        os.environ.setdefault(FOLDER, str((runs / MESHES).resolve()))
 
 
 def size_of(folder: Path) -> int:

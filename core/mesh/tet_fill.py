@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError, SetupError
+from palpate.mesh.meshers.mesh_cache import cached_tetrahedra
 from palpate.mesh.meshers.mesher_choice import SizeField, TetMesher, chosen_mesher
 from palpate.mesh.protocol import FINER
 from palpate.mesh.tet_mesh import TetMesh, sides_of, stretched
@@ -115,7 +116,7 @@ def _filled(shape: Shape, spec: TetSpec, mesher: TetMesher) -> TetMesh:
         growth=spec.growth,
     )
     try:
-        corners, tetrahedra = mesher.tetrahedra(shape, size)
+        corners, tetrahedra = cached_tetrahedra(shape, size, mesher)
     except SetupError:
         raise
     except Exception as error:  # meshers raise plain exceptions

@@ -35,6 +35,7 @@ class GmshMesher:
     """
 
     name = "Gmsh"
+    package = "gmsh"
 
     @property
     def is_there(self) -> bool:

@@ -21,9 +21,15 @@ SETTING = "PALPATE_MESHER"
 class TetMesher(Protocol):
     """A mesher; equal ones make equal meshes."""
 
+    def __hash__(self) -> int: ...
+
     @property
     def name(self) -> str:
         """Its name, for readers and for the setting, in which case does not matter."""
+
+    @property
+    def package(self) -> str:
+        """The package that it is installed with."""
 
     @property
     def is_there(self) -> bool:

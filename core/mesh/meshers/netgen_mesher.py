@@ -37,6 +37,7 @@ class NetgenMesher:
     """
 
     name = "Netgen"
+    package = "netgen-mesher"
 
     @property
     def is_there(self) -> bool:

@@ -55,13 +55,14 @@ class Shape(Geometry):
             )
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Shape) and self._digest == other._digest
+        return isinstance(other, Shape) and self.digest == other.digest
 
     def __hash__(self) -> int:
-        return hash(self._digest)
+        return hash(self.digest)
 
     @cached_property
-    def _digest(self) -> bytes:
+    def digest(self) -> bytes:
+        """SHA-256 of the surface and of what is held; equal bodies have the same."""
         parts = (
             np.ascontiguousarray(self.vertices, float),
             np.ascontiguousarray(self.triangles, np.int64),

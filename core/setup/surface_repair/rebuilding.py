@@ -27,8 +27,11 @@ _LEAST_SHARE = 0.02
 _CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 _TETRAHEDRA = np.array([(0, 4 >> a, (4 >> a) + (4 >> b), 7) for a, b, _ in permutations(range(3))])
 """Corners of the six tetrahedra around a cube's diagonal (Kuhn)."""
-_FACES = {1: ((0, 1, 0, 2, 0, 3),), 3: ((0, 3, 1, 3, 2, 3),)}
-_FACES[2] = ((0, 2, 0, 3, 1, 3), (0, 2, 1, 3, 1, 2))
+_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    1: ((0, 1, 0, 2, 0, 3),),
+    2: ((0, 2, 0, 3, 1, 3), (0, 2, 1, 3, 1, 2)),
+    3: ((0, 3, 1, 3, 2, 3),),
+}
 """Ends of the cut edges of a tetrahedron whose first 1, 2 or 3 corners are inside."""
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.foundation.errors import MeshError
 from palpate.foundation.progress import Report, silent
-from palpate.setup.free_form.surface_file import load_triangles, merge_vertices
+from palpate.setup.free_form.triangle_file import load_triangles, merge_vertices
 from palpate.setup.surface_repair.surface_deviation import SurfaceDeviation, surface_deviation
 from palpate.setup.surface_repair.surface_summary import SurfaceSummary
 from palpate.setup.surface_repair.triangle_surface import RepairStep, TriangleSurface
