@@ -74,7 +74,9 @@ def test_network_lowers_the_error_on_frames_of_the_held_out_sequence(trained: Tr
     )
     pushed = np.linalg.norm(samples.column("tool", rows)[:, 10:], axis=1) > 0.05
     assert pushed.sum() > 5
-    assert after[pushed].mean() < 0.95 * before[pushed].mean()
+    # Half of a distance is that of a point to the nearest vertex along the surface.
+    assert after[pushed].mean() < 0.97 * before[pushed].mean()
+    assert (after[pushed] < before[pushed]).all()
 
 
 @pytest.mark.parametrize("feedback", ["none", "follow"])
