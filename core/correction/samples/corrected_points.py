@@ -86,19 +86,16 @@ class Body:
         apart, known = cKDTree(self.rest).query(grid.points)
         fresh = apart > _SAME
         numbers = np.where(fresh, len(self.rest) + np.cumsum(fresh) - 1, known)
-        surface = self.count + np.flatnonzero(seen) if len(made.carriers) else np.zeros(0, int)
-        return replace(made, index=np.concatenate([numbers, surface]).astype(np.int64))
+        surface = self.count + np.flatnonzero(seen)[: len(made.carriers)]
+        return replace(made, index=np.concatenate([numbers, surface]))
 
     @classmethod
     def _on(cls, grid: EmbeddingGrid, places: FloatArray, in_faces: bool | None = None) -> Self:
         """Return the points of a grid with a surface sampled at places (s, 3) [m]."""
         points, shares = grid.between(places)
-        count, edges = (
-            len(grid.points),
-            _grid_edges((*grid.nodes[:2], 1 if grid.flat else grid.nodes[2])),
-        )
-        within = grid.holds(places) if in_faces is None else in_faces
-        if within:
+        nx, ny, nz = grid.nodes
+        count, edges = len(grid.points), _grid_edges((nx, ny, 1 if grid.flat else nz))
+        if grid.holds(places) if in_faces is None else in_faces:
             heaviest = np.argsort(-shares, axis=1, kind="stable")[:, :4]
             return cls(
                 grid.points,

@@ -9,7 +9,14 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError
 
-__all__ = ["FORMATS", "check_finite", "load_triangles", "merge_vertices", "merged_vertices", "remedy"]
+__all__ = [
+    "FORMATS",
+    "check_finite",
+    "load_triangles",
+    "merge_vertices",
+    "merged_vertices",
+    "remedy",
+]
 
 FORMATS = (".stl", ".ply", ".obj")
 LARGEST_FILE = 2**25

@@ -74,7 +74,9 @@ def test_network_lowers_the_error_on_frames_of_the_held_out_sequence(trained: Tr
     )
     pushed = np.linalg.norm(samples.column("tool", rows)[:, 10:], axis=1) > 0.05
     assert pushed.sum() > 5
-    assert after[pushed].mean() < 0.95 * before[pushed].mean()
+    # Half of a distance is that of a point to the nearest vertex along the surface.
+    assert after[pushed].mean() < 0.97 * before[pushed].mean()
+    assert (after[pushed] < before[pushed]).all()
 
 
 @pytest.mark.parametrize("feedback", ["none", "follow"])
@@ -106,8 +108,8 @@ def test_corrected_surface_stands_beside_that_of_the_run(trained: Trained) -> No
     with np.load(trained.home / "corrections" / f"{TESTED}.npz") as arrays:
         shown = {**shown, **arrays}
     assert shown["corrected"].shape == shown["raw"].shape
-    deep = np.linalg.norm(shown["raw"] - shown["rest"], axis=2).max(axis=1) > 3e-3
-    assert deep.sum() > 3
+    deep = np.linalg.norm(shown["raw"] - shown["rest"], axis=2).max(axis=1) > 2e-3
+    assert deep.sum() > 5
     moved = np.linalg.norm(shown["corrected"] - shown["raw"], axis=2).max(axis=1)
     assert (moved[deep] > 2e-4).all()
-    assert shown["distance_corrected"][deep].mean() < shown["distance_raw"][deep].mean()
+    assert shown["distance_corrected"][deep].mean() < 0.85 * shown["distance_raw"][deep].mean()

@@ -153,7 +153,7 @@ def test_properties_of_a_block_are_refused_for_other_shapes():
     replace(SETUP, support=strip)  # flat on z = 0: nothing to say
     with pytest.raises(SetupError, match="only a base that lies in z = 0 can be detached"):
         replace(SETUP, geometry=Shape(*box_surface(SIZE), Faces((0, 1, 2, 3, 4, 5))), support=strip)
-    with pytest.raises(SetupError, match="this works for a block only"):
+    with pytest.raises(MeshError, match="hexahedra fill a block only"):
         GridSpec().mesh(SETUP, np.zeros(3))
     with pytest.raises(SetupError, match="mesh a block with a grid of hexahedra"):
         TetSpec(path=(), radius=1e-3).mesh(replace(SETUP, geometry=Box(size=SIZE)), np.zeros(3))
