@@ -138,7 +138,11 @@ def starts_around(evaluator: Evaluator, trials: Sequence[Trial], current: Model)
     if not rows:
         return []
     lumps = [lump for _, lump in rows]
-    model = evaluator.evaluate(current.effects, current.predictions, (), lumps)
+    if current.has_history:  # held as it is: a replay along the tool's path costs minutes
+        held = HeldHistory(evaluator, current)
+        model = held.evaluate(current.effects, held.plain.predictions, (), lumps)
+    else:
+        model = evaluator.evaluate(current.effects, current.predictions, (), lumps)
     pairs = zip(rows, model.layout.inclusions, strict=True)
     candidates = [local_candidate(effect, column) for (effect, _), column in pairs]
     blocks, nuisance = evaluator.tempered(model), (*model.nuisance, *model.columns)
