@@ -23,6 +23,7 @@ from benchmarks import (
     replay,
     scrubbing,
     segmentation,
+    shape_accuracy,
     sweep_service,
     tetrahedra,
 )
@@ -34,6 +35,7 @@ ALL = {
     "mesh_grading": mesh_grading.run,
     "convergence": convergence.run,
     "tetrahedra": tetrahedra.run,
+    "shape_accuracy": shape_accuracy.run,
     "effect_sizes": effect_sizes.run,
     "measurement": measurement.run,
     "segmentation": segmentation.run,
