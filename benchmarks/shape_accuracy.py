@@ -10,7 +10,9 @@ spacing near the tool, which grows half as fast with the distance from there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -83,7 +85,7 @@ def shape_push(family: str) -> ShapePush:
 
 def store_reference() -> None:
     """Solve all pushes on the finest mesh, and store them."""
-    stored = {}
+    stored: dict[str, Any] = {}
     for family in FAMILIES:
         push = shape_push(family)
         frames = push.frames(FINEST.at(push.place[None]), _STEPS)
@@ -107,7 +109,7 @@ def run() -> list[Table]:
         push = shape_push(family)
         grid = default_mesh(Use.REPLAY, push.setup.geometry, RADIUS, push.place[None])
         push.frames(grid, _STEPS)  # warm-up: mesh, compilation and symbolic factorisation
-        frames, seconds = timed(lambda push=push, grid=grid: push.frames(grid, FRAMES))
+        frames, seconds = timed(partial(push.frames, grid, FRAMES))
         displacement, force = push.compared(frames)
         errors = {
             "displacement": _relative(displacement, truth[f"{family} displacement"]),

@@ -112,7 +112,7 @@ def draw_on_shape(seed: int) -> tuple[Situation, str]:
 
 def attempt_on_shape(seed: int) -> Trial:
     """Replay the situation of a seed; an exception counts as a fault."""
-    begin, outcomes = time.process_time(), ()
+    begin, outcomes = time.process_time(), tuple[Outcome, ...]()
     situation, label = draw_on_shape(seed)
     try:
         frames = replay(situation.setup, situation.centres, situation.grid, times=situation.times)

@@ -6,6 +6,7 @@ The tool is larger than stated. Robot and phantom have one frame.
 from __future__ import annotations
 
 from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -42,11 +43,11 @@ POINTS = SHAPE.surface_points((60, 30, 20))
 NORMALS = SHAPE.facing(POINTS)[1]
 
 
-def write_pressed_dome(root: Path, splits: dict[str, tuple[str, ...]], seed: int = 0) -> Dataset:
+def write_pressed_dome(root: Path, splits: Mapping[str, tuple[str, ...]], seed: int = 0) -> Dataset:
     """Write and open a dataset of three pushes a sequence, registered as it was taken."""
     rng, names = np.random.default_rng(seed), [name for names in splits.values() for name in names]
     root.mkdir(parents=True)
-    scenario = Scenario(size=SHAPE.size, mass=0.05, sequences=tuple(names), splits=splits)
+    scenario = Scenario(size=SHAPE.size, mass=0.05, sequences=tuple(names), splits=dict(splits))
     high = POINTS[POINTS[:, 2] > 0.6 * SHAPE.height]
     marks = {f"mark_{n}": np.round(high[n * len(high) // 6], 5) for n in range(6)}
     write_surface(root / "phantom.stl", SHAPE.vertices, SHAPE.triangles)
