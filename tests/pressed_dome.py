@@ -5,8 +5,8 @@ The tool is larger than stated. Robot and phantom have one frame.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
