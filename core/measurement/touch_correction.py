@@ -13,6 +13,8 @@ A touched polygon that is smaller about its middle moves nothing; it shows in th
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
@@ -21,6 +23,7 @@ from palpate.mesh.protocol import Meshing
 from palpate.registration.robot.robot_fit import rigid_fits
 from palpate.registration.robot.trace_fit import refit_traces
 from palpate.replay.replay import rest
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Setup, Touching, Tracing
 
 __all__ = ["touch_correction", "touch_misses", "touched_places"]
@@ -56,7 +59,14 @@ def _trace_correction(setup: Setup, tracing: Tracing, grid: Meshing) -> Transfor
         gaps, normals = geometry.facing(centres)
         feet = geometry.nearest(centres - gaps[:, None] * normals)
         centres = centres - (rest(setup, grid).move(feet) - feet)
-    return refit_traces(centres, geometry, setup.tool.radius)
+    here = refit_traces(centres, geometry, setup.tool.radius)
+    return here @ _as_traced(tracing, setup.stated_geometry).inverse()
+
+
+@lru_cache(maxsize=16)
+def _as_traced(tracing: Tracing, geometry: Geometry) -> Transform:
+    """The motion that the same fit finds for the stated body and ball, where none is due."""
+    return refit_traces(np.array(tracing.centres), geometry, tracing.radius)
 
 
 def touch_misses(setup: Setup, grid: Meshing) -> FloatArray:

@@ -36,6 +36,8 @@ _APART, _TURNED = 3e-3, np.radians(5.0)
 """Poses that differ by less, in place [m] and turn [rad], count as one."""
 _TRIED = 12
 """Poses of a search that are refined."""
+_REFITS, _SETTLED, _USUAL = 8, 1e-9, 2e-4
+"""Most rounds of a fit to a changed body, its last change [m], and the usual error of a gap [m]."""
 _FEWEST = 0.4
 """Least share of the traced points that lie on the surface [1]."""
 
@@ -114,10 +116,35 @@ def fit_traces(
 def refit_traces(centres: FloatArray, geometry: Geometry, radius: float) -> Transform:
     """Move traced centres (n, 3) [m], phantom frame, onto the surface of a changed body.
 
+    Every point counts, with a constant weight, so that the motion changes smoothly with body and
+    radius.
+
     Returns:
-        the motion, phantom frame; the identity for the body and the ball that they were fitted to.
+        the motion, phantom frame.
     """
-    return _refined(centres, TracedBody(_seen(geometry), radius), Transform()).pose
+    traced, pose, press = TracedBody(_seen(geometry), radius), Transform(), 0.0
+    pivot, weights = traced.body.middle, 1.0 / (_crowd(centres) * _USUAL**2)
+    prior, damping = np.append(np.zeros(6), press_prior()), np.append(1.0 / PRIOR**2, 0.0)
+    for _ in range(_REFITS):
+        gaps, rows = _linearised(centres, traced, pose, press)
+        weighted = rows * weights[:, None]
+        pull = np.append(np.zeros(6), press)
+        information = weighted.T @ rows + np.diag(prior + damping)
+        change = -np.linalg.solve(information, weighted.T @ gaps + prior * pull)
+        pose, press = small_motion(change[:6], pivot) @ pose, press + float(change[6])
+        if np.abs(change[:3]).max() < _SETTLED:
+            break
+    return pose
+
+
+def _linearised(
+    points: FloatArray, traced: TracedBody, pose: Transform, press: float
+) -> tuple[FloatArray, FloatArray]:
+    """Gaps (n,) [m] beyond a common offset, and their derivatives (n, 7) by motion and offset."""
+    moved = pose.apply(points)
+    gaps, ways = traced.errors(moved)
+    rows = np.einsum("ni,nij->nj", ways, motion_jacobian(moved, traced.body.middle))
+    return gaps - press, np.column_stack([rows, -np.ones(len(rows))])
 
 
 @lru_cache(maxsize=16)
@@ -130,12 +157,8 @@ def _refined(points: FloatArray, traced: TracedBody, pose: Transform) -> _Refine
     pivot, together = traced.body.middle, _crowd(points)
     start, press, sigma = pose, 0.0, _WIDEST
     for _ in range(_ROUNDS):
-        moved = pose.apply(points)
-        gaps, ways = traced.errors(moved)
-        gaps = gaps - press
+        gaps, rows = _linearised(points, traced, pose, press)
         weights = np.clip(1.0 - (gaps / (_TUKEY * sigma)) ** 2, 0.0, None) ** 2
-        rows = np.einsum("ni,nij->nj", ways, motion_jacobian(moved, pivot))
-        rows = np.column_stack([rows, -np.ones(len(rows))])
         weighted = rows * (weights / together / sigma**2)[:, None]
         drift = pose @ start.inverse()
         pull = np.concatenate([drift.apply(pivot[None])[0] - pivot, drift.rotation_vector, [press]])
