@@ -39,6 +39,9 @@ __all__ = ["Registration", "register", "setup_from"]
 
 _WEAK = 1.0e-3
 """Standard deviation of the robot's pose beyond which a warning is given [m]."""
+DOUBTFUL_TRACES = 0.6e-3
+"""RMS gap of the traced points on the surface beyond which a warning is given [m]: a cast differs
+from its drawing by some 0.3 mm."""
 DOUBTFUL_TOUCHES = 2.0e-3
 """RMS of the touches beyond which a warning is given [m]."""
 
@@ -247,6 +250,12 @@ def _robot_warnings(robot: RobotFit, proposal: TouchProposal | None) -> tuple[st
             f"{robot.source}: the points fit the phantom in {len(robot.alternatives) + 1} poses "
             "alike; the first is used: trace more of the surface, touch landmarks, or state "
             "[robot] phantom_from_robot.",
+        )
+    if len(robot.traced) and robot.rms > DOUBTFUL_TRACES:
+        warnings += (
+            f"The traced points lie {robot.rms * 1e3:.1f} mm RMS off the stated surface (under "
+            f"{DOUBTFUL_TRACES * 1e3:.1f} mm is expected): check [phantom] surface, its unit and "
+            "[tool] radius.",
         )
     spread = np.sqrt(np.diag(robot.covariance))
     if len(robot.traced) and (off := float(spread[:3].max())) > _WEAK:

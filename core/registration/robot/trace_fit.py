@@ -38,7 +38,7 @@ _TRIED = 12
 """Poses of a search that are refined."""
 _REFITS, _SETTLED, _USUAL = 8, 1e-9, 2e-4
 """Most rounds of a fit to a changed body, its last change [m], and the usual error of a gap [m]."""
-_FEWEST = 0.4
+_FEWEST = 0.6
 """Least share of the traced points that lie on the surface [1]."""
 
 
