@@ -37,8 +37,9 @@ def _write_traces(root: Path, shift: tuple[float, float, float] = (0.0, 0.0, 0.0
         np.column_stack([np.full(20, half_x + RADIUS), half_y * u, height]),
         np.column_stack([half_x * u, np.full(20, -half_y - RADIUS), height]),
     ]
+    normals = np.repeat(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), 20, axis=0)
     centres = np.concatenate(places) + random.normal(size=(60, 3)) * 1e-4 + shift
-    centres[::8, 2] += 6e-3
+    centres[::8] += 6e-3 * normals[::8]
     rows = [f"{n // 5},{0.1 * n:.1f},{x},{y},{z}" for n, (x, y, z) in enumerate(centres.tolist())]
     (root / "traces.csv").write_text("\n".join(["stroke,t,x,y,z", *rows]) + "\n")
 
