@@ -179,7 +179,7 @@ class FixedBaseReplay:
     def _checked(
         self, before: ToolSphere, local: ToolSphere, start: Equilibrium, found: Equilibrium
     ) -> Equilibrium:
-        """Check a frame that was found in a jump by small steps, or seek it by them.
+        """Check an equilibrium that was found in a jump by small steps.
 
         Args:
             before: tool at the start of the jump, in the frame of the block.
@@ -191,7 +191,7 @@ class FixedBaseReplay:
             `found` if steps lead to the same equilibrium; theirs if steps of half the length do;
                 else the frame without equilibrium.
         """
-        known = [found] if found.outcome is Outcome.CONVERGED else []
+        known = [found]
         for finer in (1, 2):
             parts = parts_between(before, local, finer)
             if not parts:
@@ -204,7 +204,7 @@ class FixedBaseReplay:
                 return same
             known.append(frame)
         self.dense = found.dense
-        return replace(found, outcome=Outcome.STEPS_DIFFER) if known else found
+        return replace(found, outcome=Outcome.STEPS_DIFFER)
 
     def _in_steps(self, parts: Sequence[ToolSphere], start: Equilibrium) -> Equilibrium:
         """Solve at places of the tool in the frame of the block, one after another.

@@ -76,18 +76,16 @@ def _outward(places: Any, surface: Any, nodes: Any, gradients: Any, centre: Any)
 
 
 def is_doubtful(start: Equilibrium, frame: Equilibrium) -> bool:
-    """Whether a frame after a jump is to be checked by small steps, or sought by them.
+    """Whether an equilibrium after a jump is to be checked by small steps.
 
-    It is where no equilibrium was found, or only at many more contact points than before.
+    It is where it was found only at many more contact points than before.
 
     Args:
         start: frame at the start of the jump.
         frame: that was found.
     """
     was_dense = start.dense and start.in_contact
-    return frame.outcome not in (Outcome.CONVERGED, Outcome.BASE_IN_TOOL) or (
-        frame.dense and not was_dense
-    )
+    return frame.outcome is Outcome.CONVERGED and frame.dense and not was_dense
 
 
 def parts_between(before: ToolSphere, tool: ToolSphere, finer: int = 1) -> list[ToolSphere]:

@@ -15,7 +15,7 @@ from palpate.diagnosis.inference.hypothesis import Model
 from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
 from palpate.diagnosis.inference.parameter_blocks import ModelColumns
 from palpate.diagnosis.search.candidates import candidates_of, mesh_candidates, tangents_of
-from palpate.diagnosis.search.inclusion_grid import inclusion_places
+from palpate.diagnosis.search.inclusion_grid import screened_inclusions
 from palpate.diagnosis.search.initial_guess import initial_guess
 from palpate.diagnosis.search.screening import Candidate, linear_gains, right_sides
 from palpate.effects.geometry import DIAGNOSIS_GRID, MeshResolution
@@ -42,8 +42,9 @@ def _screened(stated: Setup) -> tuple[Evaluator, Model, list[Candidate], dict[st
     with Workers(data, 1) as workers:
         evaluator = evaluator_of(stated, registration(), workers, list(PLACES), None, GRID, FINE)
         problem = evaluator.problem
+        inclusions = screened_inclusions(problem)
         baseline = evaluator.baseline(
-            tangents_of(problem.applicable, stated), inclusion_places(problem)
+            tangents_of(problem.applicable, stated), inclusions.lumps, (), inclusions.spots
         )
     finite = (
         [(DIAGNOSIS_GRID, list(evaluator.state.on_diagnosis_grid))]
