@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -12,7 +13,7 @@ import torch
 
 from palpate.foundation.errors import RunError
 
-__all__ = ["load", "random_state", "restore_random_state", "save", "save_json"]
+__all__ = ["differing", "load", "random_state", "restore_random_state", "save", "save_json"]
 
 
 def save(path: Path, content: dict[str, Any]) -> None:
@@ -68,3 +69,13 @@ def restore_random_state(state: dict[str, Any]) -> None:
     torch.set_rng_state(state["cpu"].cpu())
     if state["cuda"] and torch.cuda.is_available():
         torch.cuda.set_rng_state_all([part.cpu() for part in state["cuda"]])
+
+
+def differing(stored: dict[str, Any], expected: dict[str, Any], place: str = "") -> Iterator[str]:
+    """Yield the names of values that differ, with the names of the tables that hold them."""
+    for key, value in expected.items():
+        name, before = f"{place}{key}", stored.get(key)
+        if isinstance(value, dict) and isinstance(before, dict):
+            yield from differing(before, value, f"{name}.")
+        elif before != value:
+            yield name

@@ -280,11 +280,10 @@ class TrainingRun:
             identity, progress = state["asked"], _Progress(**state["place"])
             expected = rounded(self._identity())
             if (stored := rounded(identity)) != expected:
-                differs = ", ".join(
-                    key for key, value in expected.items() if stored.get(key) != value
-                )
+                differs = ", ".join(checkpoint.differing(stored, expected))
                 raise CorrectionError(
-                    f"{self.folder} holds another training ({differs} differ); name another folder",
+                    f"{self.folder} holds another training (different {differs}): "
+                    "start a new one in another folder",
                     key="folder",
                     value=str(self.folder),
                 )

@@ -34,10 +34,13 @@ from palpate.correction.samples.corrected_points import Body
 from palpate.correction.samples.sample_arrays import ARRAYS
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import CorrectionError, RunError
+from palpate.setup.box import Box
 
 __all__ = ["FORMAT", "Batch", "Samples", "body_for", "open_samples", "save_bodies"]
 
 FORMAT, BODY, CHART = 2, "body.npz", "chart.npz"
+BLOCKS_ONLY = 1
+"""Format without chart.npz and with the grid in samples.json; the body with a grid is a block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,13 +173,12 @@ def open_samples(folder: Path) -> Samples:
     """Open complete samples; RunError for anything else."""
     try:
         about = json.loads((folder / "samples.json").read_text())
-        body = _read_body(folder / BODY)
-        chart = _read_body(folder / CHART) if (folder / CHART).is_file() else None
+        body, chart = _read_bodies(folder, about)
     except (OSError, ValueError, KeyError) as error:
         raise RunError(
             f"{folder} holds no samples ({error}); make them first", path=str(folder)
         ) from None
-    if about.get("format") != FORMAT:
+    if about.get("format") not in (BLOCKS_ONLY, FORMAT):
         raise RunError(
             f"{folder} has samples of format {about.get('format')}; expected {FORMAT}: "
             "make them again",
@@ -206,6 +208,19 @@ def save_bodies(folder: Path, body: Body, chart: Body | None) -> None:
         if one is not None:
             arrays = one.to_arrays()
             np.savez(folder / name, **{**arrays, "grid": np.array(arrays["grid"] or [], dtype=int)})
+
+
+def _read_bodies(folder: Path, about: dict[str, Any]) -> tuple[Body, Body | None]:
+    """Return the material points and those over the top."""
+    if about.get("format") != BLOCKS_ONLY:
+        chart = _read_body(folder / CHART) if (folder / CHART).is_file() else None
+        return _read_body(folder / BODY), chart
+    with np.load(folder / BODY) as arrays:
+        body = Body.from_arrays({**arrays, "grid": about["grid"], "flat": False})
+    if body.grid is None:
+        return body, None
+    x, y, z = about["setup"]["geometry"]["size"]
+    return body, body.over(Box(size=(x, y, z)))
 
 
 def _read_body(path: Path) -> Body:
