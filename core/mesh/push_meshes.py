@@ -6,7 +6,7 @@ them, so each may have its own mesh; a replay changes the mesh while the tool is
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Self
 
@@ -42,6 +42,7 @@ class PushMeshSpec:
         spacing: of the nodes there [m], half an edge.
         growth: increase of an edge's length per distance from there [1].
         coarsest: spacing far away [m].
+        touched: distance from such a point within which a deep push touches the surface [m].
     """
 
     places: tuple[tuple[float, float, float], ...] = ()
@@ -49,6 +50,7 @@ class PushMeshSpec:
     spacing: float = 1.6e-3
     growth: float = 0.6
     coarsest: float = 4e-3
+    touched: float = field(default=10.4e-3, repr=False)
 
     def __post_init__(self) -> None:
         check_spacing(self.spacing, self.coarsest)
@@ -62,7 +64,11 @@ class PushMeshSpec:
         factor = radius / 5e-3
         spacing = self.spacing * factor
         return replace(
-            self, reach=self.reach * factor, spacing=spacing, coarsest=max(self.coarsest, spacing)
+            self,
+            reach=self.reach * factor,
+            spacing=spacing,
+            coarsest=max(self.coarsest, spacing),
+            touched=self.touched * factor,
         )
 
     def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
@@ -91,7 +97,7 @@ def _filled(shape: Shape, place: tuple[float, float, float], spec: PushMeshSpec)
         growth=spec.growth,
         coarsest=max(spec.spacing, min(spec.coarsest, _SLENDER * min(shape.size))),
     )
-    return fill(shape, size)
+    return fill(shape, size).focused(centre, spec.touched)
 
 
 REPLAY_PUSHES = PushMeshSpec(reach=6.5e-3, spacing=1.3e-3)

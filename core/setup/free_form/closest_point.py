@@ -46,6 +46,23 @@ def _shares(p: Any, a: Any, b: Any, c: Any) -> tuple[float, float, float]:  # no
 
 
 @njit(cache=True)
+def _spheres(corners: Any) -> tuple[Any, Any]:
+    """Return centres (t, 3) and radii (t,) [m] of spheres around triangles (t, 3, 3)."""
+    middles, reaches = np.empty((len(corners), 3)), np.empty(len(corners))
+    for t in range(len(corners)):
+        for k in range(3):
+            middles[t, k] = (corners[t, 0, k] + corners[t, 1, k] + corners[t, 2, k]) / 3
+        most = 0.0
+        for i in range(3):
+            far = 0.0
+            for k in range(3):
+                far += (corners[t, i, k] - middles[t, k]) ** 2
+            most = max(most, far)
+        reaches[t] = np.sqrt(most)
+    return middles, reaches
+
+
+@njit(cache=True)
 def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
     """Find the nearest of triangles (t, 3, 3) [m] to each point (m, 3) [m].
 
@@ -56,11 +73,7 @@ def nearest(points: Any, corners: Any) -> tuple[Any, Any]:
         number (m,) of the triangle, and the nearest point on it (m, 3) [m].
     """
     numbers, places = np.zeros(len(points), np.int64), np.zeros((len(points), 3))
-    middles = np.empty((len(corners), 3))
-    reaches = np.empty(len(corners))
-    for t in range(len(corners)):
-        middles[t] = (corners[t, 0] + corners[t, 1] + corners[t, 2]) / 3
-        reaches[t] = max([np.linalg.norm(corners[t, i] - middles[t]) for i in range(3)])
+    middles, reaches = _spheres(corners)
     for m in range(len(points)):
         best, most = np.inf, 0.0
         for t in range(len(corners)):
