@@ -7,7 +7,7 @@ lump or tube.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -29,42 +29,27 @@ from palpate.synthetic.bodies.organ_shape import write_surface
 from palpate.synthetic.bodies.robot_relation import ROBOT_RELATIONS, Bench
 from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
-from palpate.synthetic.bodies.shape_pushes import push_motion, reachable_places, spread_places
+from palpate.synthetic.bodies.shape_pushes import (
+    is_upright,
+    on_one_side,
+    push_motion,
+    reachable_places,
+    spread_places,
+)
 from palpate.synthetic.dataset_writer import write_config, write_ply
 from palpate.synthetic.laws.stiffness_fields import beyond_inclusion, beyond_tube
 from palpate.synthetic.make_dataset import TOUCH_NOISE, draw_camera, draw_camera_shift, record_all
-from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.disturbance import OF_ANY_BODY, draw_disturbance
+from palpate.synthetic.scenario.hidden_effects import HIDDEN, HiddenEffect
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.scenario.scenario_draws import draw_scenario
 from palpate.synthetic.scenario.truth_file import Truth
 
-__all__ = [
-    "HIDDEN_IN_SHAPES",
-    "ON_SHAPES",
-    "ShapeScenario",
-    "draw_shape_scenario",
-    "make_shape_dataset",
-]
+__all__ = ["ON_SHAPES", "ShapeScenario", "draw_shape_scenario", "make_shape_dataset"]
 
-ON_SHAPES = (
-    "poisson_ratio",
-    "stiff_inclusion",
-    "tool_radius",
-    "tool_offset",
-    "gravity",
-    "time_offset",
-    "camera_registration",
-    "surface_layer",
-    "stiffness_gradient",
-    "strain_stiffening",
-    "base_compliance",
-    "tool_compliance",
-    "depth_bias",
-    "geometry_scale",
-)
-"""Effects that the bench draws from for a free form."""
-HIDDEN_IN_SHAPES = (*ON_SHAPES, "stiff_tube")
-"""Effects that it can hide there."""
+ON_SHAPES = tuple(name for name in HIDDEN if name not in ("young_modulus", "landmark_mismatch"))
+"""Effects that the bench can hide in a free form. A modulus alone does not show without a measured
+force; touches are mistaken for each other on a block only."""
 _SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
 _PUSHES = 3
 """Pushes of a sequence."""
@@ -89,12 +74,14 @@ class ShapeScenario:
         seed: of its proportions.
         scenario: beliefs and hidden effects; its size is the shape's.
         robot: how robot and phantom are related, one of `ROBOT_RELATIONS`.
+        table: whether the camera gets readings of the table.
     """
 
     family: str
     seed: int
     scenario: Scenario
     robot: str = "touches"
+    table: bool = True
 
     @cached_property
     def stated(self) -> Shape:
@@ -109,38 +96,53 @@ class ShapeScenario:
 
 
 def draw_shape_scenario(
-    family: str, effects: int, seed: int, among: tuple[str, ...] = ON_SHAPES
+    family: str,
+    effects: int,
+    seed: int,
+    among: tuple[str, ...] = ON_SHAPES,
+    disturbances: tuple[str, ...] = (),
 ) -> ShapeScenario:
-    """Draw a free form with clear hidden effects.
+    """Draw a free form with clear hidden effects, or with disturbances outside the catalogue.
 
-    Raises SetupError for an unknown family, EffectError for an effect that no shape can have.
+    Raises SetupError for an unknown family, EffectError for an effect or a disturbance that no
+    shape can have.
 
     Args:
         family: of the shape.
         effects: number of different hidden effects.
         seed: of everything random.
         among: effects to draw from.
+        disturbances: names, of `OF_ANY_BODY`.
     """
     if family not in FAMILIES:
         raise SetupError(
             f"there is no shape {family!r}; there are {', '.join(FAMILIES)}", key="family"
         )
-    if unknown := [name for name in among if name not in HIDDEN_IN_SHAPES]:
-        raise EffectError(
-            f"the virtual bench cannot hide {unknown[0]!r} in a shape; "
-            f"it knows {', '.join(HIDDEN_IN_SHAPES)}",
-            effect=unknown[0],
-        )
+    for kind, names, known in (("hide", among, ON_SHAPES), ("have", disturbances, OF_ANY_BODY)):
+        if unknown := [name for name in names if name not in known]:
+            raise EffectError(
+                f"the virtual bench cannot {kind} {unknown[0]!r} in a shape; "
+                f"it knows {', '.join(known)}",
+                effect=unknown[0],
+            )
     shape, rng = draw_shape(family, seed), np.random.default_rng([seed, 41])
     drawn = draw_scenario(seed, effects, among=among).effects
     placed = {"stiff_inclusion": _lump, "stiff_tube": _tube}
-    hidden = tuple(placed[one.effect](shape, rng) if one.effect in placed else one for one in drawn)
-    mass = round(1000.0 * shape.volume, 5)
+    sizes = next((one for one in drawn if one.effect == "geometry_scale"), None)
+    factors = [sizes.value(f"scale_{axis}") if sizes else 1.0 for axis in "xyz"]
+    true = shape.scaled(np.array(factors)) if sizes else shape
+    hidden = tuple(placed[one.effect](true, rng) if one.effect in placed else one for one in drawn)
     corners = shape.corners[~shape.held]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    density = round(_POINTS * float(np.linalg.norm(across, axis=1).sum()) / 2)
     scenario = Scenario(
-        effects=hidden, sequences=_SEQUENCES, size=shape.size, mass=mass, density=density
+        effects=hidden,
+        disturbances=tuple(draw_disturbance(name, seed) for name in disturbances),
+        sequences=_SEQUENCES,
+        size=shape.size,
+        mass=round(1000.0 * shape.volume, 5),
+        density=round(_POINTS * float(np.linalg.norm(across, axis=1).sum()) / 2),
+        # A slip of a millimetre is not noticed, and the body is not put back.
+        put_back=all(one.effect != "base_slip" for one in hidden),
     )
     return ShapeScenario(family=family, seed=seed, scenario=scenario)
 
@@ -207,6 +209,7 @@ def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: R
     report(0.0, "letting the body settle")
     rest, settled, faces = rest_surface(scenario, body)
     camera = draw_camera(scenario, (rest + settled, faces), seen, rng)
+    camera = replace(camera, sees_table=drawn.table)
     scene = CameraScene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0)
     shift = draw_camera_shift(scenario, rng)
     write_ply(folder / "rest.ply", camera.cloud(scene, rng))
@@ -278,9 +281,13 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
         chosen = mixed[spread_places(places[mixed], _PUSHES * len(own))]
         over = _over_lump(drawn, places)
         for number, name in enumerate(own):
-            rows = chosen[number :: len(own)]
-            if len(over) > 1:
-                rows = np.append(rows[:1], rng.choice(over, _PUSHES - 1, replace=False))
+            rows, felt = chosen[number :: len(own)], over
+            if is_upright(normals):
+                near = on_one_side(normals, int(rows[0]))
+                felt = np.intersect1d(over, near)
+                rows = near[spread_places(places[near], _PUSHES)]
+            if len(felt) > 1:
+                rows = np.append(rows[:1], rng.choice(felt, _PUSHES - 1, replace=False))
             found.append(push_motion(name, shape, places[rows], normals[rows], radius, rng))
     return sorted(found, key=lambda one: names.index(one.name))
 
@@ -288,12 +295,13 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
 def _over_lump(drawn: ShapeScenario, places: FloatArray) -> IntArray:
     """Rows of places (n, 3) [m] from which a hidden lump or tube can be felt; none without one."""
     lump, tube = (drawn.scenario.hidden(name) for name in ("stiff_inclusion", "stiff_tube"))
+    felt = np.zeros(len(places), dtype=bool)
     if lump is not None:
-        return np.flatnonzero(beyond_inclusion(lump, places) < _FELT)
+        felt |= beyond_inclusion(lump, places) < _FELT
     if tube is not None:
         middle = (drawn.true.low + drawn.true.high)[:2] / 2
-        return np.flatnonzero(beyond_tube(tube, places, middle) < _FELT)
-    return np.zeros(0, dtype=np.int64)
+        felt |= beyond_tube(tube, places, middle) < _FELT
+    return np.flatnonzero(felt)
 
 
 def _above(shape: Shape) -> FloatArray:
