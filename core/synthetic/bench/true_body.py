@@ -156,8 +156,8 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     if lump is not None:
         modulus[in_inclusion(lump, block.places)] *= lump.value("stiffness_ratio")
     if tube is not None:
-        middle = (block.nodes.min(axis=0) + block.nodes.max(axis=0))[:2] / 2
-        modulus[in_tube(tube, block.places, middle)] *= tube.value("stiffness_ratio")
+        low, high = _bounding_box(block)
+        modulus[in_tube(tube, block.places, (low + high)[:2] / 2)] *= tube.value("stiffness_ratio")
     if skin is not None:
         below = height - block.places[..., 2] if block.below_skin is None else block.below_skin
         modulus *= layer_factor(skin, below)
@@ -166,12 +166,17 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     return modulus
 
 
+def _bounding_box(block: TetBlock) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner (3,) [m] of the body's own surface; its mesh cuts corners."""
+    return block.surface_rest.min(axis=0), block.surface_rest.max(axis=0)
+
+
 def _bonded(scenario: Scenario, block: TetBlock, places: FloatArray) -> BoolArray:
     """Mask (...) of places (..., 3) [m] of the base that are not detached.
 
     A strip is measured inwards from the body's bounding box.
     """
-    low, high = block.nodes.min(axis=0), block.nodes.max(axis=0)
+    low, high = _bounding_box(block)
     x, y, z = (high - low).tolist()
     middle = np.array([*(low + high)[:2] / 2, 0.0])
     return is_bonded(scenario.hidden("base_detachment"), places - middle, (x, y, z))
