@@ -251,10 +251,9 @@ def with_shapes(cases: Sequence[Case], seed: int) -> list[Case]:
             )
         number = met.setdefault(case.kind, 0)
         met[case.kind] += 1
-        family, robot, table = (
-            _turned(list(choices), seed, case.kind, number, salt)
-            for salt, choices in enumerate((FAMILIES, ROBOT_RELATIONS, (True, False)), start=1)
-        )
+        family = _turned(list(FAMILIES), seed, case.kind, number, 1)
+        robot = _turned(list(ROBOT_RELATIONS), seed, case.kind, number, 2)
+        table = _turned([True, False], seed, case.kind, number, 3)
         name = "-".join([case.name, family, robot, *([] if table else ["no-table"])])
         found.append(replace(case, name=name, shape=family, robot=robot, table=table))
     return found

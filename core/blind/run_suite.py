@@ -200,8 +200,8 @@ def _truth(
                 for name, value in pose.items()
             }
         if hidden.effect == "stiff_tube":
-            on_shape = isinstance(drawn, ShapeScenario)
-            body = drawn.true if on_shape else Box(size=scenario.true_size)
+            block = Box(size=scenario.true_size)
+            body = drawn.true if isinstance(drawn, ShapeScenario) else block
             entry["polyline"] = true_line(hidden, body)
     return described["effects"], described.get("disturbances", [])
 

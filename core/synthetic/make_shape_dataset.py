@@ -27,6 +27,12 @@ from palpate.synthetic.bench.true_body import true_radius
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.bodies.organ_shape import write_surface
 from palpate.synthetic.bodies.robot_relation import ROBOT_RELATIONS, Bench
+from palpate.synthetic.bodies.shape_draws import (
+    ON_SHAPES,
+    QUICK_ON_SHAPES,
+    draw_in_shape,
+    point_above,
+)
 from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
 from palpate.synthetic.bodies.shape_pushes import (
@@ -40,25 +46,16 @@ from palpate.synthetic.dataset_writer import write_config, write_ply
 from palpate.synthetic.laws.stiffness_fields import beyond_inclusion, beyond_tube
 from palpate.synthetic.make_dataset import TOUCH_NOISE, draw_camera, draw_camera_shift, record_all
 from palpate.synthetic.scenario.disturbance import OF_ANY_BODY, draw_disturbance
-from palpate.synthetic.scenario.hidden_effects import HIDDEN, HiddenEffect
 from palpate.synthetic.scenario.scenario import Scenario
-from palpate.synthetic.scenario.scenario_draws import draw_scenario
 from palpate.synthetic.scenario.truth_file import Truth
 
 __all__ = ["ON_SHAPES", "ShapeScenario", "draw_shape_scenario", "make_shape_dataset"]
 
-ON_SHAPES = tuple(name for name in HIDDEN if name not in ("young_modulus", "landmark_mismatch"))
-"""Effects that the bench can hide in a free form. A modulus alone does not show without a measured
-force; touches are mistaken for each other on a block only."""
 _SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
 _PUSHES = 3
 """Pushes of a sequence."""
 _FELT = 6e-3
 """Distance of a lump from a pushed place within which it is felt [m]."""
-_THICK = 0.75
-"""Least height of the surface above a lump over the body's height [1]."""
-_LARGEST_LUMP = 0.36
-"""Largest radius of a lump over the height of the surface above it [1]."""
 _POINTS = 4.5e5
 """Points in a cloud for each square metre of the body's free surface [1/m^2]."""
 _MARKS = 6
@@ -99,7 +96,7 @@ def draw_shape_scenario(
     family: str,
     effects: int,
     seed: int,
-    among: tuple[str, ...] = ON_SHAPES,
+    among: tuple[str, ...] = QUICK_ON_SHAPES,
     disturbances: tuple[str, ...] = (),
 ) -> ShapeScenario:
     """Draw a free form with clear hidden effects, or with disturbances outside the catalogue.
@@ -125,13 +122,8 @@ def draw_shape_scenario(
                 f"it knows {', '.join(known)}",
                 effect=unknown[0],
             )
-    shape, rng = draw_shape(family, seed), np.random.default_rng([seed, 41])
-    drawn = draw_scenario(seed, effects, among=among).effects
-    placed = {"stiff_inclusion": _lump, "stiff_tube": _tube}
-    sizes = next((one for one in drawn if one.effect == "geometry_scale"), None)
-    factors = [sizes.value(f"scale_{axis}") if sizes else 1.0 for axis in "xyz"]
-    true = shape.scaled(np.array(factors)) if sizes else shape
-    hidden = tuple(placed[one.effect](true, rng) if one.effect in placed else one for one in drawn)
+    shape = draw_shape(family, seed)
+    hidden = draw_in_shape(shape, effects, seed, among)
     corners = shape.corners[~shape.held]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     scenario = Scenario(
@@ -145,47 +137,6 @@ def draw_shape_scenario(
         put_back=all(one.effect != "base_slip" for one in hidden),
     )
     return ShapeScenario(family=family, seed=seed, scenario=scenario)
-
-
-def _lump(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
-    """Draw a stiff ball close under the upper part of the surface, which shows on it."""
-    places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    high = np.flatnonzero(places[:, 2] > _THICK * shape.height)
-    row = int(rng.choice(high))
-    radius = min(float(rng.uniform(8e-3, 10e-3)), _LARGEST_LUMP * float(places[row, 2]))
-    centre = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
-    values = {name: round(float(value), 5) for name, value in zip("xyz", centre, strict=True)}
-    ratio = round(float(rng.uniform(6.0, 12.0)), 2)
-    return HiddenEffect(
-        "stiff_inclusion", {**values, "radius": round(radius, 5), "stiffness_ratio": ratio}
-    )
-
-
-def _tube(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
-    """Draw a stiff tube, curved a little, close under the upper part of the surface."""
-    places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    row = int(rng.choice(np.flatnonzero(places[:, 2] > _THICK * shape.height)))
-    radius = float(rng.uniform(3e-3, 4e-3))
-    point = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
-    heading, bend = float(rng.uniform(-1.5, 1.5)), float(rng.uniform(-6.0, 6.0))
-    sag = float(rng.uniform(-6.0, 0.0))
-    along = np.array([np.cos(heading), np.sin(heading)])
-    left = np.array([-along[1], along[0]])
-    tilt = float(np.clip(-(normals[row, :2] @ along) / normals[row, 2], -0.4, 0.4))
-    away = point[:2] - (shape.low + shape.high)[:2] / 2
-    way = float(away @ along)
-    values = {
-        "aside": round(float(away @ left) - bend * way**2 / 2, 5),
-        # The slope is `tilt` under the place, and not where the axis is nearest to the middle.
-        "z": round(float(point[2]) - tilt * way + sag * way**2 / 2, 5),
-        "heading": round(heading, 4),
-        "inclination": round(float(np.arctan(tilt - sag * way)), 4),
-        "bend": round(bend, 3),
-        "sag": round(sag, 3),
-        "radius": round(radius, 5),
-        "stiffness_ratio": round(float(rng.uniform(8.0, 20.0)), 2),
-    }
-    return HiddenEffect("stiff_tube", values)
 
 
 def make_shape_dataset(
@@ -246,8 +197,8 @@ def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: R
 
 def _marks(shape: Shape) -> dict[str, FloatArray]:
     """Landmarks (3,) [m] by name, spread over the upper part of the surface."""
-    places, _ = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    sides, _ = reachable_places(shape, "poke-side", _above(shape), 5e-3)
+    places, _ = reachable_places(shape, "poke-top", point_above(shape), 5e-3)
+    sides, _ = reachable_places(shape, "poke-side", point_above(shape), 5e-3)
     every = np.concatenate([places, sides])
     chosen = every[spread_places(every, _MARKS)]
     return {f"mark_{number}": np.round(place, 5) for number, place in enumerate(chosen, start=1)}
@@ -281,9 +232,10 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
         chosen = mixed[spread_places(places[mixed], _PUSHES * len(own))]
         over = _over_lump(drawn, places)
         for number, name in enumerate(own):
-            rows, felt = chosen[number :: len(own)], over
+            rows, felt = np.asarray(chosen[number :: len(own)], dtype=np.int64), over
             if is_upright(normals):
-                near = on_one_side(normals, int(rows[0]))
+                near = rng.permutation(on_one_side(normals, int(rows[0])))
+                near = np.append(rows[:1], near[near != rows[0]])
                 felt = np.intersect1d(over, near)
                 rows = near[spread_places(places[near], _PUSHES)]
             if len(felt) > 1:
@@ -302,8 +254,3 @@ def _over_lump(drawn: ShapeScenario, places: FloatArray) -> IntArray:
         middle = (drawn.true.low + drawn.true.high)[:2] / 2
         felt |= beyond_tube(tube, places, middle) < _FELT
     return np.flatnonzero(felt)
-
-
-def _above(shape: Shape) -> FloatArray:
-    """A point (3,) [m] far above the body."""
-    return np.array([*(0.5 * (shape.low + shape.high))[:2], shape.height + 1.0])

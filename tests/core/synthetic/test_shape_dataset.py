@@ -15,6 +15,8 @@ from palpate.registration.registration import register, setup_from
 from palpate.synthetic import HiddenEffect, draw_shape_scenario, make_shape_dataset
 from palpate.synthetic.bench.true_body import solid_model
 from palpate.synthetic.bench.virtual_experiment import rest_surface
+from palpate.synthetic.bodies.shape_draws import draw_in_shape
+from palpate.synthetic.bodies.shape_families import draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
 from palpate.synthetic.bodies.shape_pushes import (
     is_upright,
@@ -125,6 +127,24 @@ def test_strip_of_a_base_is_loose_inwards_from_the_bodys_own_edge() -> None:
     assert 0.014 <= edge < 0.0165  # the mesh is fine at the edge of the strip
     loose = base & ~model.held
     assert loose.sum() > 20
+
+
+def test_effects_that_a_shape_shows_less_are_drawn_larger_than_in_a_block() -> None:
+    shape = draw_shape("kidney", 5)
+    sizes = {
+        name: [draw_in_shape(shape, 1, seed, (name,))[0] for seed in range(12)]
+        for name in ("gravity", "strain_stiffening", "base_detachment", "tool_offset")
+    }
+    weights = [one.value("specific_weight_over_stiffness") for one in sizes["gravity"]]
+    assert 3.0 <= min(weights) < max(weights) <= 4.5
+    assert max(one.value("J_m") for one in sizes["strain_stiffening"]) <= 1.0
+    for strip in sizes["base_detachment"]:
+        axis = "xy".index(str(strip.parameters["edge"])[1])
+        share = strip.value("extent") / shape.size[axis]
+        assert 0.35 < share <= 0.5 and strip.value("extent") <= 0.0385
+    for one in sizes["tool_offset"]:
+        length = np.linalg.norm([one.value(axis) for axis in ("dx", "dy", "dz")])
+        assert 2.1e-3 < length < 3.6e-3
 
 
 def test_body_that_slips_is_not_put_back() -> None:
