@@ -23,7 +23,6 @@ from palpate.app.reporting.blind_tables import (
 )
 from palpate.blind import (
     RESULTS_FILE,
-    SHAPED,
     Case,
     CaseResult,
     all_cases,
@@ -34,7 +33,6 @@ from palpate.blind import (
     run_suite,
     summary_of,
     with_nuisances,
-    with_shapes,
 )
 from palpate.foundation.errors import RunError
 
@@ -104,8 +102,9 @@ def blind(
         bool,
         typer.Option(
             "--shapes",
-            help="Phantoms of other shapes than a block, one family after the other; kinds are "
-            "control, clear and pair.",
+            help="Phantoms of other shapes than a block, of all families, with the robot related "
+            "in all ways; of 60 scenarios 15 hide nothing, 25 one effect, 10 two, and 10 a "
+            "disturbance outside the catalogue.",
         ),
     ] = False,
     any_version: Annotated[
@@ -189,12 +188,7 @@ def _cases_of(
             option = "--shapes" if shapes else "--kinds"
             raise typer.BadParameter(f"{option} needs --scenarios, the number of cases to draw")
         return all_cases(seed, CONTROLS if controls is None else controls, effects, short)
-    if not shapes:
-        return draw_cases(seed, scenarios, kinds, effects, controls, short)
-    from palpate.synthetic import ON_SHAPES
-
-    drawn = draw_cases(seed, scenarios, kinds or SHAPED, effects or ON_SHAPES, controls)
-    return with_shapes(drawn)
+    return draw_cases(seed, scenarios, kinds, effects, controls, short, shapes=shapes)
 
 
 def _nothing_of(folder: Path, cases: int) -> str:

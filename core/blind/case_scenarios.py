@@ -17,11 +17,14 @@ __all__ = ["drawn_of", "scenario_of"]
 
 def drawn_of(case: Case) -> Scenario | ShapeScenario:
     """The scenario of a case, with its shape where it is no block."""
-    from palpate.synthetic import ON_SHAPES, draw_shape_scenario
+    from palpate.synthetic import draw_shape_scenario
 
     if case.shape is None:
         return scenario_of(case)
-    return draw_shape_scenario(case.shape, len(case.hidden), case.seed, case.hidden or ON_SHAPES)
+    effects = () if case.kind == "outside" else case.hidden
+    disturbances = case.hidden if case.kind == "outside" else ()
+    drawn = draw_shape_scenario(case.shape, len(effects), case.seed, effects, disturbances)
+    return replace(drawn, robot=case.robot or "touches", table=case.table)
 
 
 def scenario_of(case: Case) -> Scenario:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,14 +23,16 @@ __all__ = [
     "with_shapes",
 ]
 
+T = TypeVar("T")
 KINDS = ("control", "clear", "subtle", "pair", "outside", "twins", "modulus", "fault")
 """Kinds of cases: nothing hidden; one effect of clear or of subtle size; two effects; a disturbance
 outside the catalogue; one effect of the family that looks alike; another Young's modulus alone,
 which does not show without a measured force; a fault of the bench that effects state
 (`palpate.synthetic.Nuisance.causes`). A drawn suite has no fault unless it is asked for."""
 
-SHAPED = ("control", "clear", "pair")
-"""Kinds of cases that the bench makes of shapes other than a block."""
+SHAPED: Mapping[str, float] = {"control": 15, "clear": 25, "pair": 10, "outside": 10}
+"""Kinds of cases that the bench makes of shapes other than a block, and their numbers in a drawn
+suite of 60."""
 
 MIX: Mapping[str, float] = {
     "control": 0.25,
@@ -47,6 +49,10 @@ in 50 shows."""
 _ASKED = 0.05
 """Share of a kind that is drawn only where it is asked for [1]."""
 
+LOCATED = ("stiff_inclusion", "stiff_tube")
+"""Effects whose place in a shape is scored. A drawn suite on shapes has three clear cases of each
+before any other effect comes again."""
+
 ALIKE = (
     "tool_radius",
     "tool_offset",
@@ -57,6 +63,8 @@ ALIKE = (
 )
 """Effects that look alike: each reproduces most of the others' pattern in a push from above."""
 
+_BENCH = ("nuisances", "camera", "filters", "shape", "robot", "table")
+"""Facts of a case that its row states only where they are not the usual ones."""
 _KIND_SEEDS, _SUITE_SEEDS = 100_000, 1_000_000
 
 
@@ -75,6 +83,8 @@ class Case:
         camera: name of a camera in place of a drawn one; None for a drawn one.
         filters: names of the filters on its images; None for a drawn one.
         shape: family of the phantom's shape; None for a block.
+        robot: how robot and phantom are related; None for touches.
+        table: whether the camera gets readings of the table.
     """
 
     name: str
@@ -86,6 +96,8 @@ class Case:
     camera: str | None = None
     filters: tuple[str, ...] | None = None
     shape: str | None = None
+    robot: str | None = None
+    table: bool = True
 
     @property
     def noisy(self) -> bool:
@@ -97,11 +109,11 @@ class Case:
         values = asdict(self) | {"hidden": list(self.hidden)}
         if self.filters is not None:
             values["filters"] = list(self.filters)
-        bench = ("nuisances", "camera", "filters", "shape")
+        usual = {name: getattr(type(self), name) for name in _BENCH}
         return {
             name: value
             for name, value in values.items()
-            if name not in bench or value not in (False, None)
+            if name not in usual or value != usual[name]
         }
 
     @classmethod
@@ -150,8 +162,10 @@ def draw_cases(
     effects: Sequence[str] | None = None,
     controls: int | None = None,
     short: bool = False,
+    *,
+    shapes: bool = False,
 ) -> list[Case]:
-    """Draw a suite in the proportions of MIX; RunError for unknown names.
+    """Draw a suite in the proportions of MIX, or of SHAPED; RunError for unknown names.
 
     A longer suite begins with the cases of a shorter one. Within a kind each effect (pair,
     disturbance) comes once before any comes again.
@@ -160,28 +174,36 @@ def draw_cases(
         seed: of everything that is hidden.
         count: number of cases.
         kinds: of KINDS; all without it.
-        effects: to be hidden; those of `palpate.synthetic.WEIGHED` without it.
-        controls: number of cases with nothing hidden; by MIX without it.
+        effects: to be hidden; those of `palpate.synthetic.WEIGHED` without it, of `ON_SHAPES` for
+            shapes.
+        controls: number of cases with nothing hidden; by the proportions without it.
         short: whether five sequences are recorded, not seven.
+        shapes: whether phantoms have other shapes than a block, see `with_shapes`.
     """
-    chosen = _checked_kinds(kinds)
-    effects = _checked_effects(effects)
+    from palpate.synthetic import DISTURBANCES, OF_ANY_BODY, ON_SHAPES
+
+    mix = SHAPED if shapes else MIX
+    chosen = _checked_kinds(list(SHAPED) if shapes and kinds is None else kinds)
+    again = 2 * LOCATED if shapes and effects is None else ()
+    effects = _checked_effects(ON_SHAPES if shapes and effects is None else effects)
+    disturbances = OF_ANY_BODY if shapes else tuple(DISTURBANCES)
     if controls is not None and controls > count:
         raise RunError(
             f"{controls} controls are more than the {count} scenarios in all", controls=controls
         )
     drawn = [kind for kind in chosen if kind != "control"] if controls is not None else chosen
-    order = [*_interleaved(drawn, count - (controls or 0)), *["control"] * (controls or 0)]
+    order = [*_interleaved(drawn, count - (controls or 0), mix), *["control"] * (controls or 0)]
     met: dict[str, int] = {}
     cases = []
     for kind in order:
         number = met.setdefault(kind, 0)
         met[kind] += 1
-        hidden = _hidden(kind, seed, number, effects)
+        every = (*effects, *again) if kind == "clear" else effects
+        hidden = _turned(_choices(kind, every, disturbances), seed, kind, number)
         name = "-".join([kind, str(seed), f"{number:03d}", *hidden])
         own = _SUITE_SEEDS * seed + _KIND_SEEDS * (1 + KINDS.index(kind)) + number
         cases.append(Case(name, own, kind, hidden, short))
-    return cases
+    return with_shapes(cases, seed) if shapes else cases
 
 
 def with_nuisances(
@@ -201,28 +223,40 @@ def with_nuisances(
     return [replace(case, nuisances=True, camera=camera, filters=chosen) for case in cases]
 
 
-def with_shapes(cases: Sequence[Case]) -> list[Case]:
-    """The same cases with phantoms of other shapes than a block, one family after the other.
+def with_shapes(cases: Sequence[Case], seed: int) -> list[Case]:
+    """The same cases with phantoms of other shapes than a block.
 
+    Within a kind each family comes once before any comes again, and so does each relation of the
+    robot, and a table that is seen or not. A longer suite begins with the cases of a shorter one.
     Raises RunError for a kind of case or an effect that the bench cannot make of a shape.
-    """
-    from palpate.synthetic import FAMILIES, HIDDEN_IN_SHAPES
 
+    Args:
+        cases: of blocks.
+        seed: of the suite.
+    """
+    from palpate.synthetic import FAMILIES, OF_ANY_BODY, ON_SHAPES, ROBOT_RELATIONS
+
+    met: dict[str, int] = {}
+    found = []
     for case in cases:
-        unknown = [name for name in case.hidden if name not in HIDDEN_IN_SHAPES]
+        known = OF_ANY_BODY if case.kind == "outside" else ON_SHAPES
+        unknown = [name for name in case.hidden if name not in known]
         if case.kind not in SHAPED or case.nuisances or unknown:
             what = unknown[0] if unknown else "nuisances" if case.nuisances else case.kind
             raise RunError(
                 f"{case.name}: the virtual bench has no {what} on a shape; kinds are "
-                f"{', '.join(SHAPED)}, and effects {', '.join(HIDDEN_IN_SHAPES)}",
+                f"{', '.join(SHAPED)}, effects {', '.join(ON_SHAPES)}, and disturbances "
+                f"{', '.join(OF_ANY_BODY)}",
                 case=case.name,
             )
-    families = list(FAMILIES)
-    return [
-        replace(case, name=f"{case.name}-{family}", shape=family)
-        for number, case in enumerate(cases)
-        for family in [families[number % len(families)]]
-    ]
+        number = met.setdefault(case.kind, 0)
+        met[case.kind] += 1
+        family = _turned(list(FAMILIES), seed, case.kind, number, 1)
+        robot = _turned(list(ROBOT_RELATIONS), seed, case.kind, number, 2)
+        table = _turned([True, False], seed, case.kind, number, 3)
+        name = "-".join([case.name, family, robot, *([] if table else ["no-table"])])
+        found.append(replace(case, name=name, shape=family, robot=robot, table=table))
+    return found
 
 
 def _checked_kinds(kinds: Sequence[str] | None) -> list[str]:
@@ -246,11 +280,11 @@ def _checked_effects(effects: Sequence[str] | None) -> tuple[str, ...]:
     return chosen
 
 
-def _interleaved(kinds: Sequence[str], count: int) -> list[str]:
+def _interleaved(kinds: Sequence[str], count: int, mix: Mapping[str, float]) -> list[str]:
     """Order `count` kinds by their shares; next is always the kind furthest behind its share."""
     if count and not kinds:
         raise RunError("no kind of case is left to be drawn: name others, or fewer controls")
-    shares = {kind: MIX[kind] or _ASKED for kind in kinds}
+    shares = {kind: mix.get(kind, 0.0) or _ASKED for kind in kinds}
     total = sum(shares.values())
     met = dict.fromkeys(kinds, 0)
     order: list[str] = []
@@ -261,22 +295,25 @@ def _interleaved(kinds: Sequence[str], count: int) -> list[str]:
     return order
 
 
-def _hidden(kind: str, seed: int, number: int, effects: Sequence[str]) -> tuple[str, ...]:
-    choices = _choices(kind, effects)
+def _turned(choices: Sequence[T], seed: int, kind: str, number: int, salt: int = 0) -> T:
+    """Return one of the choices for the case of this number: each comes once before any comes
+    again, in an order drawn anew for each turn.
+    """
     turn, place = divmod(number, len(choices))
-    order = np.random.default_rng([seed, 15485863, KINDS.index(kind), turn]).permutation(
-        len(choices)
-    )
-    return choices[int(order[place])]
+    salted = [salt] if salt else []
+    rng = np.random.default_rng([seed, 15485863, KINDS.index(kind), turn, *salted])
+    return choices[int(rng.permutation(len(choices))[place])]
 
 
-def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
-    from palpate.synthetic import DISTURBANCES, FAULTS
+def _choices(
+    kind: str, effects: Sequence[str], disturbances: Sequence[str]
+) -> list[tuple[str, ...]]:
+    from palpate.synthetic import FAULTS
 
     choices: dict[str, list[tuple[str, ...]]] = {
         "control": [()],
         "pair": list(combinations(effects, 2)),
-        "outside": [(name,) for name in DISTURBANCES],
+        "outside": [(name,) for name in disturbances],
         "twins": [(effect,) for effect in effects if effect in ALIKE],
         "modulus": [("young_modulus",)],
         "fault": [(name,) for name in FAULTS],

@@ -32,6 +32,8 @@ _POWERS = {"extent": 5 / 3}
 """Exponents of other parameters in the surface's displacement [1]. Measured: replays of a block
 pushed at four places, with a strip of 1/10 to 9/20 of its length detached along one edge, follow
 exponents of 1.5 to 1.8."""
+_TUBE, _REACH = ("aside", "z", "heading"), 2e-2
+"""Parameters that place a level tube, and length of it that pushes feel to either side [m]."""
 _BESIDE = ("time_constant",)
 """Parameters that do not set the strength of an effect; a limit is stated at one value of them."""
 
@@ -46,8 +48,9 @@ def size_over_limit(
 
     Sizes of several parameters are added in squares: each alone gains the bound at its limit, and
     gains grow with the square. The limit of a lump is that of the nearest screened place and its
-    radius, and a lump acts in proportion to its volume (Eshelby 1957). The limit of a detached
-    strip is that of its edge. The limit of other candidates is the one that half of them reach.
+    radius, and a lump acts in proportion to its volume (Eshelby 1957), a tube to its cross-section.
+    The limit of a detached strip is that of its edge. The limit of other candidates is the one that
+    half of them reach.
 
     Args:
         hidden: effects.
@@ -117,15 +120,28 @@ def _nearest(
     def far(at: Mapping[str, Any]) -> float:
         if "edge" in at:
             return float(at["edge"]["value"] != hidden.parameters["edge"])
+        if "aside" in at:
+            return _apart({name: at[name]["value"] for name in _TUBE}, hidden)
         return math.dist(
             [at[name]["value"] for name in "xyz"], [hidden.value(name) for name in "xyz"]
         )
 
-    each = [one for one in row.get("each", []) if "x" in one["at"] or "edge" in one["at"]]
+    each = [one for one in row.get("each", []) if {"x", "edge", "aside"} & set(one["at"])]
     best = min(
         each, key=lambda one: far(one["at"]), default={"limit": row["typical"], "at": row["at"]}
     )
     return best["limit"], best["at"]
+
+
+def _apart(screened: Mapping[str, float], hidden: HiddenEffect) -> float:
+    """Distance of a screened level tube from a hidden one [m], which is the same from either end:
+    that of their middles, and that of their ends `_REACH` away by their headings.
+    """
+    turn = hidden.value("heading") - screened["heading"]
+    aside = hidden.value("aside") * (1.0 if math.cos(turn) >= 0 else -1.0)
+    return math.hypot(
+        aside - screened["aside"], hidden.value("z") - screened["z"], _REACH * math.sin(turn)
+    )
 
 
 def _part(
@@ -149,7 +165,8 @@ def _part(
     least = limit["factor"] if "factor" in limit else limit["change"]
     if least is None:
         return 0.0
-    volume = (true["radius"] / at["radius"]["value"]) ** 3 if "radius" in at else 1.0
+    grows = 2 if "aside" in at else 3
+    volume = (true["radius"] / at["radius"]["value"]) ** grows if "radius" in at else 1.0
     return float(
         volume
         * far

@@ -10,6 +10,7 @@ from typing import Any
 from scipy.stats import norm
 
 from palpate.blind.case_results import CaseResult
+from palpate.blind.located_causes import same_way
 from palpate.blind.proportions import IntervalEstimate, median_of, rate, share_of
 from palpate.effects import Parameter, effect_named
 from palpate.foundation.errors import EffectError
@@ -121,7 +122,7 @@ def reported_parameters(results: Iterable[CaseResult]) -> list[ReportedParameter
             if hidden.get("second_law"):
                 kept = SECOND_LAWS[hidden["effect"]].kept
                 entries = {name: entry for name, entry in entries.items() if name in kept}
-            for name, true in hidden["parameters"].items():
+            for name, true in same_way(hidden["parameters"], entries).items():
                 if name in entries and isinstance(true["value"], (int, float)):
                     found.append(
                         _reported_parameter(result, hidden["effect"], name, true, entries[name])

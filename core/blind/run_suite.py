@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.blind.case_results import RESULTS_FILE, CaseResult, add_result, read_results
 from palpate.blind.case_scenarios import drawn_of
@@ -22,6 +22,9 @@ from palpate.foundation.errors import RunError
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
 from palpate.foundation.source_digest import source_digest
+
+if TYPE_CHECKING:
+    from palpate.synthetic import Scenario, ShapeScenario, Truth
 
 __all__ = ["known_results", "run_case", "run_suite", "source_digest"]
 
@@ -152,7 +155,7 @@ def run_case(
             made = make_drawn(dataset, drawn, case.seed)
         else:
             dataset, made = stored_dataset(store, case.name, drawn, case.seed)
-        hidden, outside = _truth(made, scenario.size)
+        hidden, outside = _truth(made, drawn)
         doing, began = "diagnosing it", time.monotonic()
         result = diagnose(open_dataset(dataset), run, workers=1, replays=whole, assurance=whole)
         seconds = round(time.monotonic() - began, 1)
@@ -176,18 +179,30 @@ def run_case(
     return CaseResult(case, hidden, result, outside, size, seconds, source_digest())
 
 
-def _truth(made: Any, size: Sequence[float]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Hidden effects and disturbances, with a camera's pose in the parameters of a report."""
+def _truth(
+    made: Truth, drawn: Scenario | ShapeScenario
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Hidden effects and disturbances, with a camera's pose in the parameters of a report, and a
+    tube's line.
+    """
+    from palpate.blind.dataset_store import scenario_in
     from palpate.blind.effect_sizes import camera_pose
+    from palpate.blind.located_causes import true_line
+    from palpate.setup.setup import Box
+    from palpate.synthetic import ShapeScenario
 
-    described = made.as_dict()
-    for entry in described["effects"]:
-        if entry["effect"] == "camera_registration":
-            pose = camera_pose(made.camera_shift, size)
+    described, scenario = made.as_dict(), scenario_in(drawn)
+    for entry, hidden in zip(described["effects"], made.effects, strict=True):
+        if hidden.effect == "camera_registration":
+            pose = camera_pose(made.camera_shift, scenario.size)
             entry["parameters"] |= {
                 name: {"value": value, "unit": "m" if name[0] == "t" else "rad"}
                 for name, value in pose.items()
             }
+        if hidden.effect == "stiff_tube":
+            block = Box(size=scenario.true_size)
+            body = drawn.true if isinstance(drawn, ShapeScenario) else block
+            entry["polyline"] = true_line(hidden, body)
     return described["effects"], described.get("disturbances", [])
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from palpate.blind.calibration import calibration_error, first_effect
 from palpate.blind.case_results import CaseResult
+from palpate.blind.located_causes import NEAR, centre_error, centre_errors, line_share, line_shares
 from palpate.blind.parameter_errors import (
     SCORED_LEVEL,
     coverage,
@@ -22,6 +23,9 @@ __all__ = ["TARGETS", "Target", "grade", "judge_targets"]
 
 CLEAR, SUBTLE = 5.0, 2.0
 """Size over the detection limit from which an effect is clear, and from which it is subtle [1]."""
+
+LEAST_LINE = 0.8
+"""Share of a tube's length that is to be found [1]."""
 
 Measure = Callable[[Sequence[CaseResult]], IntervalEstimate]
 
@@ -136,6 +140,26 @@ def _covered(results: Sequence[CaseResult]) -> IntervalEstimate:
 
 def _removed(chosen: Callable[[Sequence[CaseResult]], list[CaseResult]]) -> Measure:
     return lambda results: median_of([result.removed or 0.0 for result in chosen(results)])
+
+
+def _on_shapes(kind: str, effect: str = "") -> Callable[[Sequence[CaseResult]], list[CaseResult]]:
+    """Select cases of a kind on shapes, all or those that hide an effect."""
+    return lambda results: [
+        result
+        for result in results
+        if result.case.kind == kind
+        and result.case.shape is not None
+        and (not effect or effect in result.truth)
+    ]
+
+
+def _centre_found(result: CaseResult) -> bool:
+    error = centre_error(result)
+    return error is not None and error <= NEAR
+
+
+def _line_found(result: CaseResult) -> bool:
+    return (line_share(result) or 0.0) >= LEAST_LINE
 
 
 _ALONE, _AMONG = "it is named first", "it is among what is named"
@@ -275,6 +299,43 @@ TARGETS = (
         "One of 5 detection limits or more: reducible error removed",
         _removed(_graded("clear")),
         0.85,
+    ),
+    Target(
+        "shapes.clear.first",
+        f"On shapes, one clear effect: {_ALONE}",
+        _share(_on_shapes("clear"), lambda r: r.first),
+        24 / 25,
+    ),
+    Target(
+        "shapes.control.named",
+        "On shapes, nothing hidden: a cause is named",
+        _share(_on_shapes("control"), lambda r: bool(r.named)),
+        high=0.0,
+    ),
+    Target(
+        "shapes.inclusion.centre",
+        "On shapes, inclusion: error of its centre",
+        lambda r: median_of(centre_errors(_on_shapes("clear")(r))),
+        high=NEAR,
+        unit="m",
+    ),
+    Target(
+        "shapes.inclusion.near",
+        f"On shapes, inclusion: named, its centre within {NEAR * 1e3:g} mm",
+        _share(_on_shapes("clear", "stiff_inclusion"), _centre_found),
+        1.0,
+    ),
+    Target(
+        "shapes.tube.line",
+        f"On shapes, tube: share of its length within {NEAR * 1e3:g} mm",
+        lambda r: median_of(line_shares(_on_shapes("clear")(r))),
+        LEAST_LINE,
+    ),
+    Target(
+        "shapes.tube.near",
+        f"On shapes, tube: named, {LEAST_LINE * 100:g} % of its length so near",
+        _share(_on_shapes("clear", "stiff_tube"), _line_found),
+        1.0,
     ),
 )
 """Targets. Errors are medians over clear cases. Chosen, not derived: 95 % for look-alikes and the

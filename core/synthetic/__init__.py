@@ -5,11 +5,11 @@ finite-element solver with another mesh, element and material law than the repla
 `make_palpation` and `make_shape_dataset` write whole datasets with their truth beside them.
 """
 
+from palpate.synthetic.bodies.robot_relation import ROBOT_RELATIONS
 from palpate.synthetic.bodies.shape_families import FAMILIES
 from palpate.synthetic.make_dataset import make_dataset
 from palpate.synthetic.make_palpation import Palpation, draw_palpation, make_palpation
 from palpate.synthetic.make_shape_dataset import (
-    HIDDEN_IN_SHAPES,
     ON_SHAPES,
     ShapeScenario,
     draw_shape_scenario,
@@ -23,7 +23,12 @@ from palpate.synthetic.nuisances import (
     Nuisance,
     draw_nuisances,
 )
-from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance, draw_disturbance
+from palpate.synthetic.scenario.disturbance import (
+    DISTURBANCES,
+    OF_ANY_BODY,
+    Disturbance,
+    draw_disturbance,
+)
 from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, WEIGHED, HiddenEffect
 from palpate.synthetic.scenario.paper_protocol import (
     PAPER_EFFECTS,
@@ -43,13 +48,14 @@ __all__ = [
     "FAULTS",
     "FILTERS",
     "HIDDEN",
-    "HIDDEN_IN_SHAPES",
     "NUISANCES",
+    "OF_ANY_BODY",
     "ON_SHAPES",
     "PAPER_EFFECTS",
     "PAPER_SEED",
     "PAPER_SIZES",
     "QUICK",
+    "ROBOT_RELATIONS",
     "SHORT_PROTOCOL",
     "WEIGHED",
     "Disturbance",

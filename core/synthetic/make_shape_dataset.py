@@ -7,7 +7,7 @@ lump or tube.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -27,53 +27,35 @@ from palpate.synthetic.bench.true_body import true_radius
 from palpate.synthetic.bench.virtual_experiment import rest_surface
 from palpate.synthetic.bodies.organ_shape import write_surface
 from palpate.synthetic.bodies.robot_relation import ROBOT_RELATIONS, Bench
+from palpate.synthetic.bodies.shape_draws import (
+    ON_SHAPES,
+    QUICK_ON_SHAPES,
+    draw_in_shape,
+    point_above,
+)
 from palpate.synthetic.bodies.shape_families import FAMILIES, draw_shape
 from palpate.synthetic.bodies.shape_mesher import ShapeMesher
-from palpate.synthetic.bodies.shape_pushes import push_motion, reachable_places, spread_places
+from palpate.synthetic.bodies.shape_pushes import (
+    is_upright,
+    on_one_side,
+    push_motion,
+    reachable_places,
+    spread_places,
+)
 from palpate.synthetic.dataset_writer import write_config, write_ply
 from palpate.synthetic.laws.stiffness_fields import beyond_inclusion, beyond_tube
 from palpate.synthetic.make_dataset import TOUCH_NOISE, draw_camera, draw_camera_shift, record_all
-from palpate.synthetic.scenario.hidden_effects import HiddenEffect
+from palpate.synthetic.scenario.disturbance import OF_ANY_BODY, draw_disturbance
 from palpate.synthetic.scenario.scenario import Scenario
-from palpate.synthetic.scenario.scenario_draws import draw_scenario
 from palpate.synthetic.scenario.truth_file import Truth
 
-__all__ = [
-    "HIDDEN_IN_SHAPES",
-    "ON_SHAPES",
-    "ShapeScenario",
-    "draw_shape_scenario",
-    "make_shape_dataset",
-]
+__all__ = ["ON_SHAPES", "ShapeScenario", "draw_shape_scenario", "make_shape_dataset"]
 
-ON_SHAPES = (
-    "poisson_ratio",
-    "stiff_inclusion",
-    "tool_radius",
-    "tool_offset",
-    "gravity",
-    "time_offset",
-    "camera_registration",
-    "surface_layer",
-    "stiffness_gradient",
-    "strain_stiffening",
-    "base_compliance",
-    "tool_compliance",
-    "depth_bias",
-    "geometry_scale",
-)
-"""Effects that the bench draws from for a free form."""
-HIDDEN_IN_SHAPES = (*ON_SHAPES, "stiff_tube")
-"""Effects that it can hide there."""
 _SEQUENCES = ("poke-top-01", "poke-top-02", "poke-top-03", "poke-side-01", "poke-side-02")
 _PUSHES = 3
 """Pushes of a sequence."""
 _FELT = 6e-3
 """Distance of a lump from a pushed place within which it is felt [m]."""
-_THICK = 0.75
-"""Least height of the surface above a lump over the body's height [1]."""
-_LARGEST_LUMP = 0.36
-"""Largest radius of a lump over the height of the surface above it [1]."""
 _POINTS = 4.5e5
 """Points in a cloud for each square metre of the body's free surface [1/m^2]."""
 _MARKS = 6
@@ -89,12 +71,14 @@ class ShapeScenario:
         seed: of its proportions.
         scenario: beliefs and hidden effects; its size is the shape's.
         robot: how robot and phantom are related, one of `ROBOT_RELATIONS`.
+        table: whether the camera gets readings of the table.
     """
 
     family: str
     seed: int
     scenario: Scenario
     robot: str = "touches"
+    table: bool = True
 
     @cached_property
     def stated(self) -> Shape:
@@ -109,81 +93,50 @@ class ShapeScenario:
 
 
 def draw_shape_scenario(
-    family: str, effects: int, seed: int, among: tuple[str, ...] = ON_SHAPES
+    family: str,
+    effects: int,
+    seed: int,
+    among: tuple[str, ...] = QUICK_ON_SHAPES,
+    disturbances: tuple[str, ...] = (),
 ) -> ShapeScenario:
-    """Draw a free form with clear hidden effects.
+    """Draw a free form with clear hidden effects, or with disturbances outside the catalogue.
 
-    Raises SetupError for an unknown family, EffectError for an effect that no shape can have.
+    Raises SetupError for an unknown family, EffectError for an effect or a disturbance that no
+    shape can have.
 
     Args:
         family: of the shape.
         effects: number of different hidden effects.
         seed: of everything random.
         among: effects to draw from.
+        disturbances: names, of `OF_ANY_BODY`.
     """
     if family not in FAMILIES:
         raise SetupError(
             f"there is no shape {family!r}; there are {', '.join(FAMILIES)}", key="family"
         )
-    if unknown := [name for name in among if name not in HIDDEN_IN_SHAPES]:
-        raise EffectError(
-            f"the virtual bench cannot hide {unknown[0]!r} in a shape; "
-            f"it knows {', '.join(HIDDEN_IN_SHAPES)}",
-            effect=unknown[0],
-        )
-    shape, rng = draw_shape(family, seed), np.random.default_rng([seed, 41])
-    drawn = draw_scenario(seed, effects, among=among).effects
-    placed = {"stiff_inclusion": _lump, "stiff_tube": _tube}
-    hidden = tuple(placed[one.effect](shape, rng) if one.effect in placed else one for one in drawn)
-    mass = round(1000.0 * shape.volume, 5)
+    for kind, names, known in (("hide", among, ON_SHAPES), ("have", disturbances, OF_ANY_BODY)):
+        if unknown := [name for name in names if name not in known]:
+            raise EffectError(
+                f"the virtual bench cannot {kind} {unknown[0]!r} in a shape; "
+                f"it knows {', '.join(known)}",
+                effect=unknown[0],
+            )
+    shape = draw_shape(family, seed)
+    hidden = draw_in_shape(shape, effects, seed, among)
     corners = shape.corners[~shape.held]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    density = round(_POINTS * float(np.linalg.norm(across, axis=1).sum()) / 2)
     scenario = Scenario(
-        effects=hidden, sequences=_SEQUENCES, size=shape.size, mass=mass, density=density
+        effects=hidden,
+        disturbances=tuple(draw_disturbance(name, seed) for name in disturbances),
+        sequences=_SEQUENCES,
+        size=shape.size,
+        mass=round(1000.0 * shape.volume, 5),
+        density=round(_POINTS * float(np.linalg.norm(across, axis=1).sum()) / 2),
+        # A slip of a millimetre is not noticed, and the body is not put back.
+        put_back=all(one.effect != "base_slip" for one in hidden),
     )
     return ShapeScenario(family=family, seed=seed, scenario=scenario)
-
-
-def _lump(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
-    """Draw a stiff ball close under the upper part of the surface, which shows on it."""
-    places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    high = np.flatnonzero(places[:, 2] > _THICK * shape.height)
-    row = int(rng.choice(high))
-    radius = min(float(rng.uniform(8e-3, 10e-3)), _LARGEST_LUMP * float(places[row, 2]))
-    centre = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
-    values = {name: round(float(value), 5) for name, value in zip("xyz", centre, strict=True)}
-    ratio = round(float(rng.uniform(6.0, 12.0)), 2)
-    return HiddenEffect(
-        "stiff_inclusion", {**values, "radius": round(radius, 5), "stiffness_ratio": ratio}
-    )
-
-
-def _tube(shape: Shape, rng: np.random.Generator) -> HiddenEffect:
-    """Draw a stiff tube, curved a little, close under the upper part of the surface."""
-    places, normals = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    row = int(rng.choice(np.flatnonzero(places[:, 2] > _THICK * shape.height)))
-    radius = float(rng.uniform(3e-3, 4e-3))
-    point = places[row] - normals[row] * (radius + rng.uniform(1.5e-3, 2.5e-3))
-    heading, bend = float(rng.uniform(-1.5, 1.5)), float(rng.uniform(-6.0, 6.0))
-    sag = float(rng.uniform(-6.0, 0.0))
-    along = np.array([np.cos(heading), np.sin(heading)])
-    left = np.array([-along[1], along[0]])
-    tilt = float(np.clip(-(normals[row, :2] @ along) / normals[row, 2], -0.4, 0.4))
-    away = point[:2] - (shape.low + shape.high)[:2] / 2
-    way = float(away @ along)
-    values = {
-        "aside": round(float(away @ left) - bend * way**2 / 2, 5),
-        # The slope is `tilt` under the place, and not where the axis is nearest to the middle.
-        "z": round(float(point[2]) - tilt * way + sag * way**2 / 2, 5),
-        "heading": round(heading, 4),
-        "inclination": round(float(np.arctan(tilt - sag * way)), 4),
-        "bend": round(bend, 3),
-        "sag": round(sag, 3),
-        "radius": round(radius, 5),
-        "stiffness_ratio": round(float(rng.uniform(8.0, 20.0)), 2),
-    }
-    return HiddenEffect("stiff_tube", values)
 
 
 def make_shape_dataset(
@@ -207,6 +160,7 @@ def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: R
     report(0.0, "letting the body settle")
     rest, settled, faces = rest_surface(scenario, body)
     camera = draw_camera(scenario, (rest + settled, faces), seen, rng)
+    camera = replace(camera, sees_table=drawn.table)
     scene = CameraScene((rest + settled, faces), None, np.array([0.0, 0.0, -1.0]), 1.0)
     shift = draw_camera_shift(scenario, rng)
     write_ply(folder / "rest.ply", camera.cloud(scene, rng))
@@ -243,8 +197,8 @@ def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: R
 
 def _marks(shape: Shape) -> dict[str, FloatArray]:
     """Landmarks (3,) [m] by name, spread over the upper part of the surface."""
-    places, _ = reachable_places(shape, "poke-top", _above(shape), 5e-3)
-    sides, _ = reachable_places(shape, "poke-side", _above(shape), 5e-3)
+    places, _ = reachable_places(shape, "poke-top", point_above(shape), 5e-3)
+    sides, _ = reachable_places(shape, "poke-side", point_above(shape), 5e-3)
     every = np.concatenate([places, sides])
     chosen = every[spread_places(every, _MARKS)]
     return {f"mark_{number}": np.round(place, 5) for number, place in enumerate(chosen, start=1)}
@@ -278,9 +232,14 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
         chosen = mixed[spread_places(places[mixed], _PUSHES * len(own))]
         over = _over_lump(drawn, places)
         for number, name in enumerate(own):
-            rows = chosen[number :: len(own)]
-            if len(over) > 1:
-                rows = np.append(rows[:1], rng.choice(over, _PUSHES - 1, replace=False))
+            rows, felt = np.asarray(chosen[number :: len(own)], dtype=np.int64), over
+            if is_upright(normals):
+                near = rng.permutation(on_one_side(normals, int(rows[0])))
+                near = np.append(rows[:1], near[near != rows[0]])
+                felt = np.intersect1d(over, near)
+                rows = near[spread_places(places[near], _PUSHES)]
+            if len(felt) > 1:
+                rows = np.append(rows[:1], rng.choice(felt, _PUSHES - 1, replace=False))
             found.append(push_motion(name, shape, places[rows], normals[rows], radius, rng))
     return sorted(found, key=lambda one: names.index(one.name))
 
@@ -288,14 +247,10 @@ def _motions(drawn: ShapeScenario, camera: DepthCamera, seed: int) -> list[Motio
 def _over_lump(drawn: ShapeScenario, places: FloatArray) -> IntArray:
     """Rows of places (n, 3) [m] from which a hidden lump or tube can be felt; none without one."""
     lump, tube = (drawn.scenario.hidden(name) for name in ("stiff_inclusion", "stiff_tube"))
+    felt = np.zeros(len(places), dtype=bool)
     if lump is not None:
-        return np.flatnonzero(beyond_inclusion(lump, places) < _FELT)
+        felt |= beyond_inclusion(lump, places) < _FELT
     if tube is not None:
         middle = (drawn.true.low + drawn.true.high)[:2] / 2
-        return np.flatnonzero(beyond_tube(tube, places, middle) < _FELT)
-    return np.zeros(0, dtype=np.int64)
-
-
-def _above(shape: Shape) -> FloatArray:
-    """A point (3,) [m] far above the body."""
-    return np.array([*(0.5 * (shape.low + shape.high))[:2], shape.height + 1.0])
+        felt |= beyond_tube(tube, places, middle) < _FELT
+    return np.flatnonzero(felt)

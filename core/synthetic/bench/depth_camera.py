@@ -68,6 +68,7 @@ class DepthCamera:
         offset: a depth z is read as scale z + offset [m], before disturbances.
         scale: see `offset` [1].
         curvature: what a reading adds for each squared metre from a depth of 0.35 m [1/m].
+        sees_table: whether the table gives readings; black cloth gives none.
     """
 
     phantom_from_camera: Transform
@@ -81,6 +82,7 @@ class DepthCamera:
     offset: float = 0.0
     scale: float = 1.0
     curvature: float = 0.0
+    sees_table: bool = True
 
     def reading(self, depth: FloatArray) -> FloatArray:
         """Return the readings [m] of true depths [m], before disturbances, bias and noise."""
@@ -133,7 +135,7 @@ class DepthCamera:
         """
         on_block = min(1.0, self.density / max(int(self.on_block.sum()), 1))
         others = min(1.0, 0.45 * self.density / max(int((~self.on_block).sum()), 1))
-        return np.where(what == 1, others, on_block)
+        return np.where(what == 1, others if self.sees_table else 0.0, on_block)
 
     def _flying(self, depth: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Mix depths before and behind an edge in some pixels (flying pixels)."""

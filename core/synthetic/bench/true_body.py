@@ -69,15 +69,24 @@ def material_levels(scenario: Scenario) -> tuple[float, ...]:
     return (scenario.true_size[2] - skin.value("thickness"),) if skin else ()
 
 
-def base_seams(scenario: Scenario) -> tuple[tuple[int, float], ...]:
+def base_seams(
+    scenario: Scenario, low: FloatArray | None = None, high: FloatArray | None = None
+) -> tuple[tuple[int, float], ...]:
     """Axis and position [m] of the edge of a detached strip of the base, to which the mesh is
     aligned.
+
+    Args:
+        scenario: that hides it.
+        low: lowest corner (3,) of the body's bounding box [m]; that of the block without it.
+        high: highest corner (3,) [m]; that of the block without it.
     """
     strip = scenario.hidden("base_detachment")
     if strip is None:
         return ()
     axis, sign = side_of(str(strip.parameters["edge"]))
-    return ((axis, sign * (scenario.true_size[axis] / 2 - strip.value("extent"))),)
+    half = scenario.true_size[axis] / 2
+    ends = (-half if low is None else low[axis], half if high is None else high[axis])
+    return ((axis, float(ends[sign > 0] - sign * strip.value("extent"))),)
 
 
 def solid_model(scenario: Scenario, block: TetBlock, axis: FloatArray | None = None) -> SolidModel:
@@ -94,7 +103,7 @@ def solid_model(scenario: Scenario, block: TetBlock, axis: FloatArray | None = N
     )
     poisson_ratio = nu.value("nu") if nu else scenario.poisson_ratio
     height = block.places[..., 2] / scenario.true_size[2]
-    held = _held(scenario, block.nodes)
+    held = (block.nodes[:, 2] < 1e-9) & _bonded(scenario, block, block.nodes)
     return SolidModel(
         young_modulus=_modulus(scenario, block),
         poisson_ratio=poisson_ratio + uneven_poisson_ratio(nu, height),
@@ -147,8 +156,8 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     if lump is not None:
         modulus[in_inclusion(lump, block.places)] *= lump.value("stiffness_ratio")
     if tube is not None:
-        middle = (block.nodes.min(axis=0) + block.nodes.max(axis=0))[:2] / 2
-        modulus[in_tube(tube, block.places, middle)] *= tube.value("stiffness_ratio")
+        low, high = _bounding_box(block)
+        modulus[in_tube(tube, block.places, (low + high)[:2] / 2)] *= tube.value("stiffness_ratio")
     if skin is not None:
         below = height - block.places[..., 2] if block.below_skin is None else block.below_skin
         modulus *= layer_factor(skin, below)
@@ -157,14 +166,20 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
     return modulus
 
 
-def _held(scenario: Scenario, nodes: FloatArray) -> BoolArray:
-    """Mask (n,) of nodes (n, 3) that a rigid support holds."""
-    return (nodes[:, 2] < 1e-9) & _bonded(scenario, nodes)
+def _bounding_box(block: TetBlock) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner (3,) [m] of the body's own surface; its mesh cuts corners."""
+    return block.surface_rest.min(axis=0), block.surface_rest.max(axis=0)
 
 
-def _bonded(scenario: Scenario, places: FloatArray) -> BoolArray:
-    """Mask (...) of places (..., 3) [m] of the base that are not detached."""
-    return is_bonded(scenario.hidden("base_detachment"), places, scenario.true_size)
+def _bonded(scenario: Scenario, block: TetBlock, places: FloatArray) -> BoolArray:
+    """Mask (...) of places (..., 3) [m] of the base that are not detached.
+
+    A strip is measured inwards from the body's bounding box.
+    """
+    low, high = _bounding_box(block)
+    x, y, z = (high - low).tolist()
+    middle = np.array([*(low + high)[:2] / 2, 0.0])
+    return is_bonded(scenario.hidden("base_detachment"), places - middle, (x, y, z))
 
 
 def _springs(scenario: Scenario, block: TetBlock, hidden: HiddenEffect) -> FloatArray:
@@ -173,5 +188,5 @@ def _springs(scenario: Scenario, block: TetBlock, hidden: HiddenEffect) -> Float
         "fqa,fai->fqi", block.sole.values, block.nodes[block.elements[block.sole.owner]]
     )
     stiffness = hidden.value("stiffness_over_E") * scenario.true_modulus
-    even = np.where(_bonded(scenario, places), stiffness, 0.0)
+    even = np.where(_bonded(scenario, block, places), stiffness, 0.0)
     return np.asarray(even * spring_factor(hidden, places, scenario.true_size))

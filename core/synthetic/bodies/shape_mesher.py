@@ -15,6 +15,7 @@ from palpate.mesh.tet_fill import TetSpec, fill
 from palpate.setup.free_form.closest_point import nearest
 from palpate.setup.free_form.shape import Shape
 from palpate.synthetic.bench.motion_plan import PlannedPush
+from palpate.synthetic.bench.true_body import base_seams
 from palpate.synthetic.laws.stiffness_fields import points_along
 from palpate.synthetic.scenario.scenario import Scenario
 from palpate.synthetic.solver.tet_block import (
@@ -105,7 +106,8 @@ def _vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def lump_grading(scenario: Scenario, low: FloatArray, high: FloatArray) -> TetGrading | None:
-    """Edges small enough for a hidden lump or tube; None without one.
+    """Edges small enough for a hidden lump or tube, and for the edge of a detached strip of the
+    base; None without any.
 
     Args:
         scenario: that hides it.
@@ -113,15 +115,25 @@ def lump_grading(scenario: Scenario, low: FloatArray, high: FloatArray) -> TetGr
         high: highest corner (3,) [m].
     """
     lump, tube = (scenario.hidden(name) for name in ("stiff_inclusion", "stiff_tube"))
+    parts = []
     if lump is not None:
-        radius, centre = lump.value("radius"), np.array([[lump.value(axis) for axis in "xyz"]])
-        edge = 0.55 * radius
-    elif tube is not None:
-        radius, centre = tube.value("radius"), points_along(tube, low, high)
-        edge = radius
-    else:
+        radius = lump.value("radius")
+        parts.append((np.array([[lump.value(axis) for axis in "xyz"]]), radius, 0.55 * radius))
+    if tube is not None:
+        radius = tube.value("radius")
+        parts.append((points_along(tube, low, high), radius, radius))
+    seams = base_seams(scenario, low, high)
+    if not parts and not seams:
         return None
-    count = len(centre)
+    reach, edges = (
+        np.concatenate([np.zeros(0), *(np.full(len(part[0]), part[n]) for part in parts)])
+        for n in (1, 2)
+    )
     return TetGrading(
-        centre, np.full(count, 1.1 * radius), np.full(count, edge), coarse=1.0, growth=3.0
+        np.concatenate([np.zeros((0, 3)), *(part[0] for part in parts)]),
+        1.1 * reach,
+        edges,
+        coarse=1.0,
+        growth=3.0,
+        seams=seams,
     )

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.setup.free_form.shape import Shape
 from palpate.synthetic.bench.motion_plan import MotionPlan, PlannedPush
 
-__all__ = ["push_motion", "reachable_places", "spread_places", "timed_push"]
+__all__ = [
+    "is_upright",
+    "on_one_side",
+    "push_motion",
+    "reachable_places",
+    "spread_places",
+    "timed_push",
+]
 
 _HOVER, _ABOVE = 5e-3, 12e-3
 """Distance from the surface before a push, and height of the travel above everything [m]."""
@@ -18,6 +26,13 @@ _LEAST_HEIGHT = 0.4
 """Least height of a pushed place over the body's height [1]."""
 _RISE: Mapping[str, tuple[float, float]] = {"poke-top": (0.85, 1.01), "poke-side": (0.5, 0.85)}
 """Least and largest height of the surface's normal, by kind of push [1]."""
+_UPRIGHT, _FEW_SLOPES = (-0.1, 0.5), 6
+"""The same for an upright side, and number of places on slopes below which upright sides are
+pushed."""
+_LEAN = np.arctan2(0.67, 0.74)
+"""Angle of the shaft from the vertical, away from an upright side [rad]."""
+_ONE_SIDE = 0.7
+"""Least cosine between normals of places that one leaning tool reaches [1]."""
 _DEPTH, _DEEPEST = (5e-3, 8e-3), 0.3
 """Depth of a push [m], and largest depth over the height of the place [1]."""
 
@@ -35,14 +50,29 @@ def reachable_places(
     """
     places = shape.surface_points()
     normals = shape.facing(places + 1e-6 * np.array([0.0, 0.0, 1.0]))[1]
-    low, high = _RISE[kind]
-    fit = (normals[:, 2] >= low) & (normals[:, 2] < high)
-    fit &= places[:, 2] > _LEAST_HEIGHT * shape.height
+    fit = places[:, 2] > _LEAST_HEIGHT * shape.height
     fit &= np.einsum("ni,ni->n", eye - places, normals) > 0
     # The ball touches at one point alone: nothing else of the body is in its way.
     centres = places + reach * normals
     fit[fit] &= shape.gap(centres[fit], reach) > -0.1 * reach
-    return places[fit], normals[fit]
+    own = fit & _rises(normals, _RISE[kind])
+    if kind == "poke-side" and own.sum() < _FEW_SLOPES:
+        own = fit & _rises(normals, _UPRIGHT)
+    return places[own], normals[own]
+
+
+def _rises(normals: FloatArray, within: tuple[float, float]) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    return np.asarray((normals[:, 2] >= within[0]) & (normals[:, 2] < within[1]))
+
+
+def is_upright(normals: FloatArray) -> bool:
+    """Whether the surface with normals (n, 3) is pushed by a leaning tool."""
+    return bool((normals[:, 2] < _UPRIGHT[1]).any())
+
+
+def on_one_side(normals: FloatArray, row: int) -> IntArray:
+    """Rows of normals (n, 3) that one leaning tool reaches with that of `row`."""
+    return np.flatnonzero(normals @ normals[row] > _ONE_SIDE)
 
 
 def spread_places(places: FloatArray, count: int) -> list[int]:
@@ -65,7 +95,10 @@ def push_motion(
     radius: float,
     rng: np.random.Generator,
 ) -> MotionPlan:
-    """Plan the pushes of one sequence at places (n, 3) [m], along their outward normals (n, 3)."""
+    """Plan the pushes of one sequence at places (n, 3) [m], along their outward normals (n, 3).
+
+    The tool hangs from above; before an upright side it leans away from it.
+    """
     top, time, pushes = shape.height + radius + _ABOVE, 1.2, []
     for place, normal in zip(places, normals, strict=True):
         depth = min(rng.uniform(*_DEPTH), _DEEPEST * place[2])
@@ -73,7 +106,15 @@ def push_motion(
         way = np.array([[hover[0], hover[1], max(top, hover[2] + 1e-3)], hover, deep])
         pushes.append(timed_push(way, time, rng))
         time = float(pushes[-1].times[-1]) + rng.uniform(0.5, 0.8)
-    return MotionPlan(name, np.array([0.0, 0.0, -1.0]), tuple(pushes), time + 0.8)
+    return MotionPlan(name, _shaft(normals), tuple(pushes), time + 0.8)
+
+
+def _shaft(normals: FloatArray) -> FloatArray:
+    """Unit vector (3,) from the shaft to the tip, for pushes along these normals (n, 3)."""
+    if not is_upright(normals):
+        return np.array([0.0, 0.0, -1.0])
+    away = normals[:, :2].mean(axis=0)
+    return np.array([*(-np.sin(_LEAN) * away / np.linalg.norm(away)), -np.cos(_LEAN)])
 
 
 def timed_push(way: FloatArray, begin: float, rng: np.random.Generator) -> PlannedPush:

@@ -18,7 +18,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.synthetic.scenario.parameter_names import check_named
 
-__all__ = ["DISTURBANCES", "Disturbance", "draw_disturbance", "drifted", "rippled"]
+__all__ = ["DISTURBANCES", "OF_ANY_BODY", "Disturbance", "draw_disturbance", "drifted", "rippled"]
 
 DISTURBANCES: Mapping[str, Mapping[str, str]] = {
     "camera_drift": {"translation": "m", "rotation": "rad"},
@@ -37,6 +37,9 @@ displacement over the block's modulus, and the side it lies against, which the c
 it is black, so the camera does not see it either. `shaft_contact`: angle of the shaft from the
 vertical, over the block, in pushes from the side.
 """
+OF_ANY_BODY = ("camera_drift", "depth_ripple", "phantom_creep")
+"""Those that any body can have: a second body needs an upright side to lie against, and a shaft the
+rim of a level top."""
 _Range = tuple[float, float] | tuple[str, str, str, str]
 _CLEAR: Mapping[str, Mapping[str, _Range]] = {
     "camera_drift": {"translation": (1.0e-3, 2.0e-3), "rotation": (0.008, 0.016)},

@@ -203,8 +203,9 @@ def refine_mesh(mesh: Any, grading: TetGrading) -> Any:
         if mesh.t.shape[1] > 60_000:
             break
         mesh = mesh.refined(large)
+    finest = grading.fine.min(initial=SEAM)
     raise MeshError(
-        f"{mesh.t.shape[1]} elements do not reach edges of {grading.fine.min() * 1e3:.2g} mm; "
+        f"{mesh.t.shape[1]} elements do not reach edges of {finest * 1e3:.2g} mm; "
         "choose a coarser grid"
     )
 

@@ -149,3 +149,39 @@ def test_what_cannot_be_asked_for_is_exit_code_2(
 ) -> None:
     assert run(monkeypatch, "--folder", str(tmp_path / "none"), *arguments) == 2
     assert not (tmp_path / "none").exists()
+
+
+def test_suite_on_shapes_prints_how_far_lumps_and_tubes_were_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = [[-0.03, 0.0, 0.02], [0.03, 0.0, 0.02]]
+    ball = result(
+        "clear",
+        "stiff_inclusion",
+        "found",
+        [cause("stiff_inclusion", **dict.fromkeys("xyz", (0.002, 0.001, 0.003)))],
+        truth={"x": 0.0, "y": 0.0, "z": 2e-3},
+    )
+    tube = result("clear", "stiff_tube", "found", [{**cause("stiff_tube"), "polyline": line[:1]}])
+    tube = replace(tube, hidden=[{**tube.hidden[0], "polyline": line}])
+    made = {("stiff_inclusion",): ball, ("stiff_tube",): tube, (): CONTROL}
+    for case in draw_cases(4, 60, shapes=True):
+        if case.hidden in made:
+            known = replace(made[case.hidden], case=case, code=source_digest())
+            add_result(tmp_path / "results.jsonl", known)
+    options = ("--folder", str(tmp_path), "--seed", "4", "--shapes", "--scenarios", "60")
+    assert run(monkeypatch, *options, "--score") == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "nothing hidden: 15 of 15 right" in told and "one effect, clear: 6 of 6 right" in told
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["missing"] == 60 - 15 - 6
+    targets = {one["key"]: one for one in summary["targets"]}
+    centre, tubes = targets["shapes.inclusion.centre"], targets["shapes.tube.near"]
+    assert (centre["reached"]["value"], centre["met"]) == (
+        pytest.approx(8**0.5 * 1e-3, rel=1e-5),
+        True,
+    )
+    assert (tubes["reached"]["hits"], tubes["reached"]["n"], tubes["met"]) == (0, 3, False)
+    assert targets["shapes.inclusion.near"]["reached"]["hits"] == 3
+    page = (tmp_path / "report.html").read_text()
+    assert "On shapes, inclusion: error of its centre" in page and "2.8" in page

@@ -18,7 +18,7 @@ from palpate.blind import (
     with_nuisances,
     with_shapes,
 )
-from palpate.blind.cases import ALIKE
+from palpate.blind.cases import ALIKE, LOCATED
 from palpate.effects import DIAGNOSED
 from palpate.foundation.errors import RunError
 from palpate.synthetic import (
@@ -27,8 +27,10 @@ from palpate.synthetic import (
     FAULTS,
     FILTERS,
     HIDDEN,
+    OF_ANY_BODY,
     ON_SHAPES,
     QUICK,
+    ROBOT_RELATIONS,
     SHORT_PROTOCOL,
     WEIGHED,
     ShapeScenario,
@@ -219,28 +221,59 @@ def test_faults_are_drawn_where_they_are_asked_for() -> None:
         assert kinds & set(FAULTS) == set(case.hidden)
 
 
-def test_cases_of_shapes_have_each_family_in_turn_and_the_same_body_each_time() -> None:
-    cases = with_shapes(draw_cases(5, 8, SHAPED, ON_SHAPES))
-    assert {case.shape for case in cases} == set(FAMILIES)
-    assert all(case.name.endswith(str(case.shape)) for case in cases)
-    for case in cases:
+def test_drawn_suite_on_shapes_has_its_mix_and_every_family_relation_and_view() -> None:
+    cases = draw_cases(5, 60, shapes=True)
+    assert Counter(case.kind for case in cases) == SHAPED
+    assert sum(SHAPED.values()) == 60
+    assert len({case.name for case in cases}) == len({case.seed for case in cases}) == 60
+    for kind, number in SHAPED.items():
+        own = [case for case in cases if case.kind == kind]
+        for every, counted in (
+            (FAMILIES, Counter(case.shape for case in own)),
+            (ROBOT_RELATIONS, Counter(case.robot for case in own)),
+            ((True, False), Counter(case.table for case in own)),
+        ):
+            assert set(counted) == set(every)
+            assert max(counted.values()) - min(counted.values()) <= 1, (kind, number)
+    assert draw_cases(5, 60, shapes=True)[:13] == draw_cases(5, 13, shapes=True)
+
+
+def test_clear_cases_on_shapes_hide_every_effect_and_lumps_and_tubes_three_times() -> None:
+    clear = [case for case in draw_cases(5, 60, shapes=True) if case.kind == "clear"]
+    counted = Counter(case.hidden[0] for case in clear)
+    assert set(counted) == set(ON_SHAPES)
+    assert {name for name, count in counted.items() if count == 3} == set(LOCATED)
+    chosen = draw_cases(5, 6, ["clear"], ["gravity", "stiff_tube"], shapes=True)
+    assert Counter(effects_of(chosen)) == {"gravity": 3, "stiff_tube": 3}
+
+
+def test_cases_of_shapes_are_the_same_each_time() -> None:
+    for case in draw_cases(5, 8, shapes=True):
         drawn = drawn_of(case)
         assert isinstance(drawn, ShapeScenario)
-        assert {one.effect for one in drawn.scenario.effects} == set(case.hidden)
-        assert Case.from_json(case.to_json()) == case
-    again = drawn_of(cases[0])
-    assert isinstance(again, ShapeScenario) and again == drawn_of(cases[0])
-    assert "shape" not in draw_cases(5, 1)[0].to_json()
+        hidden = (*drawn.scenario.effects, *drawn.scenario.disturbances)
+        names = {getattr(one, "effect", None) or getattr(one, "name", None) for one in hidden}
+        assert names == set(case.hidden)
+        assert (drawn.family, drawn.robot, drawn.table) == (case.shape, case.robot, case.table)
+        assert Case.from_json(json.loads(json.dumps(case.to_json()))) == case
+        assert drawn_of(case) == drawn
+    assert not {"shape", "robot", "table"} & set(draw_cases(5, 1)[0].to_json())
+
+
+def test_cases_outside_the_catalogue_on_shapes_hide_what_any_body_can_have() -> None:
+    outside = [case for case in draw_cases(5, 60, shapes=True) if case.kind == "outside"]
+    assert {case.hidden for case in outside} == {(name,) for name in OF_ANY_BODY}
 
 
 @pytest.mark.parametrize(
     ("case", "message"),
     [
-        (Case("a", 1, "outside", ("ripple",)), "has no ripple on a shape"),
-        (Case("a", 1, "clear", ("base_slip",)), "has no base_slip on a shape"),
+        (Case("a", 1, "outside", ("second_body",)), "has no second_body on a shape"),
+        (Case("a", 1, "clear", ("landmark_mismatch",)), "has no landmark_mismatch on a shape"),
+        (Case("a", 1, "subtle", ("gravity",)), "has no subtle on a shape"),
         (Case("a", 1, "control", nuisances=True), "has no nuisances on a shape"),
     ],
 )
 def test_cases_that_no_shape_can_be_are_refused(case: Case, message: str) -> None:
     with pytest.raises(RunError, match=message):
-        with_shapes([case])
+        with_shapes([case], 5)

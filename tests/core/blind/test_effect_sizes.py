@@ -120,6 +120,27 @@ def test_lump_acts_in_proportion_to_its_volume() -> None:
     assert large is not None and large / small == pytest.approx(1.2**3, abs=1e-3)
 
 
+def test_tube_is_measured_by_the_nearest_one_from_either_end_and_by_its_cross_section() -> None:
+    straight = {"inclination": 0.0, "bend": 0.0, "sag": 0.0, "radius": 4e-3}
+    crossing = {"aside": 6e-3, "z": 0.02, "heading": 0.0, **straight}
+    beside = {"aside": -6e-3, "z": 0.02, "heading": math.pi / 2, **straight}
+    limits = [
+        {"parameter": "stiffness_ratio", "unit": "1", "factor": factor} for factor in (5.0, 3.0)
+    ]
+    ambiguity_map = {
+        **row("stiff_tube", limits[1], typical=limits[0], at=beside),
+        "each": [
+            {"at": row("", limit, at=at)["at"], "limit": limit}
+            for at, limit in zip((crossing, beside), limits, strict=True)
+        ],
+    }
+    hidden = {**beside, "heading": 1.4, "radius": 5e-3, "stiffness_ratio": 3.0}
+    found = size(HiddenEffect("stiff_tube", hidden), ambiguity_map)
+    assert found == pytest.approx((5 / 4) ** 2, rel=1e-3)
+    turned = {**hidden, "heading": 1.4 - math.pi, "aside": 6e-3}
+    assert size(HiddenEffect("stiff_tube", turned), ambiguity_map) == found
+
+
 def test_share_gives_a_size_only_where_the_surface_moves_in_proportion() -> None:
     sag = row("gravity", {"share": 0.25}, at={"specific_weight_over_stiffness": 1.5})
     assert size(
