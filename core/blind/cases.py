@@ -125,7 +125,7 @@ def all_cases(
     Raises:
         RunError: for an unknown effect.
     """
-    from palpate.synthetic import DISTURBANCES, HIDDEN
+    from palpate.synthetic import HIDDEN, WEIGHED_DISTURBANCES
 
     chosen, known = _checked_effects(effects), list(HIDDEN)
     cases = [
@@ -135,7 +135,7 @@ def all_cases(
     if effects is None:
         cases += [
             Case(f"{name}-{seed}", 1000 * seed + 401 + place, "outside", (name,), short)
-            for place, name in enumerate(DISTURBANCES)
+            for place, name in enumerate(WEIGHED_DISTURBANCES)
         ]
     return cases + [
         Case(f"control-{seed}-{place:02d}", 1000 * seed + 500 + place, "control", (), short)
@@ -271,12 +271,12 @@ def _hidden(kind: str, seed: int, number: int, effects: Sequence[str]) -> tuple[
 
 
 def _choices(kind: str, effects: Sequence[str]) -> list[tuple[str, ...]]:
-    from palpate.synthetic import DISTURBANCES, FAULTS
+    from palpate.synthetic import FAULTS, WEIGHED_DISTURBANCES
 
     choices: dict[str, list[tuple[str, ...]]] = {
         "control": [()],
         "pair": list(combinations(effects, 2)),
-        "outside": [(name,) for name in DISTURBANCES],
+        "outside": [(name,) for name in WEIGHED_DISTURBANCES],
         "twins": [(effect,) for effect in effects if effect in ALIKE],
         "modulus": [("young_modulus",)],
         "fault": [(name,) for name in FAULTS],

@@ -23,7 +23,12 @@ from palpate.synthetic.nuisances import (
     Nuisance,
     draw_nuisances,
 )
-from palpate.synthetic.scenario.disturbance import DISTURBANCES, Disturbance, draw_disturbance
+from palpate.synthetic.scenario.disturbance import (
+    DISTURBANCES,
+    WEIGHED_DISTURBANCES,
+    Disturbance,
+    draw_disturbance,
+)
 from palpate.synthetic.scenario.hidden_effects import HIDDEN, QUICK, WEIGHED, HiddenEffect
 from palpate.synthetic.scenario.paper_protocol import (
     PAPER_EFFECTS,
@@ -52,6 +57,7 @@ __all__ = [
     "QUICK",
     "SHORT_PROTOCOL",
     "WEIGHED",
+    "WEIGHED_DISTURBANCES",
     "Disturbance",
     "HiddenEffect",
     "Nuisance",
