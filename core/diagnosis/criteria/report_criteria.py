@@ -159,9 +159,9 @@ class StiffnessMapCriteria:
 
     cell: float = threshold(1.0, "1", "Edge of a cell of the map, in radii of the tool.")
     reach: float = threshold(
-        4.0, "1", "Distance from a touched place up to which there are cells, in radii of the tool."
+        3.0, "1", "Distance from a touched place up to which there are cells, in radii of the tool."
     )
-    most_cells: int = threshold(240, "1", "Largest number of cells.")
+    most_cells: int = threshold(400, "1", "Largest number of cells.")
     growth: float = threshold(1.1, "1", "Factor on the edge of the cells while they are too many.")
     lengths: tuple[float, ...] = threshold(
         (1.0, 2.0, 4.0, 8.0),
