@@ -160,7 +160,7 @@ def stiffness_map_of(
 def stiffness_map(
     evaluator: Evaluator, data: Sequence[Observations], start: Model, seed: int
 ) -> StiffnessMap | None:
-    """Return the map beside the effects of a model; None where no cell is near a push.
+    """Return the map beside the effects of a model; None where no push feels a cell.
 
     Args:
         evaluator: of the fitted sequences, with their noise.
@@ -176,7 +176,7 @@ def stiffness_map(
     model = evaluator.evaluate(start.effects, start.predictions or None, (), cells.balls)
     field = _settled(evaluator, model, cells, radius, seed)
     pushes = felt_pushes(evaluator, data, model)
-    if not pushes:
+    if not pushes or not (field.felt > 0).any():
         return None
     surface = _thinned(body.surface_points(), cells.spacing)
     spread = _below(surface, body, cells, radius)
