@@ -16,6 +16,8 @@ _ENDS = {
     "+y": "the side towards +y",
     "+z": "the top",
 }
+_TIMES = 2.0
+"""Ratio above which a part is said to be so many times as stiff, and not by how many percent."""
 
 
 def stiffness_sentences(report: dict[str, Any]) -> list[str]:
@@ -39,14 +41,15 @@ def stiffness_sentences(report: dict[str, Any]) -> list[str]:
 def _part(part: dict[str, Any]) -> str:
     """A part of the body with its ratio and interval, place, and pushes."""
     ratio, low, high = (part[name] for name in ("ratio", "low", "high"))
-    kind = "Stiffer" if ratio >= 1.0 else "Softer"
-    ends = sorted(100 * abs(end - 1.0) for end in (low, high))
+    if ratio > _TIMES:
+        said = f"{ratio:.1f} times as stiff as the rest ({low:.1f} to {high:.1f})"
+    else:
+        kind = "Stiffer" if ratio >= 1.0 else "Softer"
+        ends = sorted(100 * abs(end - 1.0) for end in (low, high))
+        share = f"{100 * abs(ratio - 1.0):.0f}{NARROW}%"
+        said = f"{kind} than the rest by {share} ({ends[0]:.0f} to {ends[1]:.0f})"
     place = ", ".join(f"{1e3 * along:.0f}" for along in part["at"])
-    felt = _counted(part["pushes"])
-    return (
-        f"{kind} than the rest by {100 * abs(ratio - 1.0):.0f}{NARROW}% "
-        f"({ends[0]:.0f} to {ends[1]:.0f}) around ({place}){NARROW}mm, felt by {felt}."
-    )
+    return f"{said} around ({place}){NARROW}mm, felt by {_counted(part['pushes'])}."
 
 
 def _counted(pushes: Sequence[int]) -> str:

@@ -19,6 +19,7 @@ FOUND = {
     "unfelt_ends": ["-x"],
     "parts": [
         {"at": [0.01, -0.004, 0.03], "ratio": 1.4, "low": 1.2, "high": 1.7, "pushes": [3, 7, 9]},
+        {"at": [0.02, 0.0, 0.03], "ratio": 3.8, "low": 1.81, "high": 11.8, "pushes": [1, 4]},
         {"at": [-0.01, 0.0, 0.03], "ratio": 0.6, "low": 0.4, "high": 0.9, "pushes": [2]},
     ],
     "surface": [
@@ -33,6 +34,8 @@ def test_parts_pushes_and_what_was_not_felt_are_said() -> None:
     assert told == [
         "Stiffer than the rest by 40 % (20 to 70) around (10, -4, 30) mm, "
         "felt by pushes 3, 7 and 9.",
+        "3.8 times as stiff as the rest (1.8 to 11.8) around (20, 0, 30) mm, "
+        "felt by pushes 1 and 4.",
         "Softer than the rest by 40 % (10 to 60) around (-10, 0, 30) mm, felt by push 2.",
         "Free map of the stiffness: 31.2 nats over a uniform body, chance gives 4.0; told below "
         "42 % of the surface; the end towards -x was not felt.",

@@ -37,7 +37,7 @@ class MappedValues:
     Attributes:
         places: (n, 3) phantom frame [m].
         mean: (n,) contrast [1].
-        deviation: (n,) of the posterior [1].
+        deviation: (n,) of the posterior and of the engine [1].
         left: (n,) share of the prior deviation that the data leave [1].
     """
 
@@ -105,7 +105,8 @@ class StiffnessMap:
             for matrix in (self.field.covariance, self.field.prior)
         )
         left = np.where(known & (before > 0), after / np.where(before > 0, before, 1.0), 1.0)
-        return MappedValues(places, own @ self.field.mean, after, left)
+        deviation = np.hypot(after, CRITERIA.stiffness_map.accuracy)
+        return MappedValues(places, own @ self.field.mean, deviation, left)
 
     @property
     def inside(self) -> MappedValues:
