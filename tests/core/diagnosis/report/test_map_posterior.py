@@ -74,14 +74,15 @@ def test_cells_tile_what_is_near_the_pushes_and_are_not_too_many(cells: MapCells
     assert 0 < len(crowded.centres) <= CRITERIA.stiffness_map.most_cells
 
 
-def test_field_finds_stiffer_cells_and_knows_what_no_push_feels(cells: MapCells) -> None:
+def test_field_finds_stiffer_cells_and_knows_what_pushes_hardly_feel(cells: MapCells) -> None:
     truth = np.where(cells.centres[:, 0] < -8e-3, 0.3, 0.0)
     found = posterior(cells, truth)
     assert found.gain > found.bound + 20
     under = np.linalg.norm(cells.centres[:, None] - TOUCHED, axis=2).argmin(axis=0)
     assert found.mean[under[0]] > found.mean[under[3]] + 0.1
     share = np.sqrt(np.diag(found.covariance) / np.diag(found.prior))
-    assert share[under].max() < 0.9 and share[np.abs(felt(cells)).max(axis=0) < 0.1].min() > 0.8
+    weak = felt(cells).max(axis=0) < 2.0
+    assert weak.any() and share[under].max() < share[weak].min() < share[weak].max() < 1.0
 
 
 def test_uniform_bodies_gain_more_than_the_bound_as_rarely_as_stated(cells: MapCells) -> None:
