@@ -28,7 +28,7 @@ def stiffness_sentences(report: dict[str, Any]) -> list[str]:
     if not found:
         return []
     gain = (
-        f"{found['gain_nats']:.1f} nats over a uniform body, chance gives {found['bound_nats']:.1f}"
+        f"{found['gain_nats']:.1f} nats over a uniform body, {found['bound_nats']:.1f} are needed"
     )
     if not found["structured"]:
         return [f"{found['why_not'].capitalize()} ({gain})."]

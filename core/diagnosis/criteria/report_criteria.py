@@ -185,7 +185,11 @@ class StiffnessMapCriteria:
         0.99, "1", "Share of uniform bodies whose map is to be called noise."
     )
     least_gain: float = threshold(
-        3.0, "nat", "Smallest gain over a uniform body of a map that is shown, whatever the draws."
+        12.0,
+        "nat",
+        "Smallest gain over a uniform body of a map that is shown, whatever the draws: the noise "
+        "model is not exact.",
+        "measured: two uniform bodies gain -1.9 and 3.2, uneven ones 32 to 112",
     )
     most_left: float = threshold(
         0.7,

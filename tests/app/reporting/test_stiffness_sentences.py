@@ -37,7 +37,7 @@ def test_parts_pushes_and_what_was_not_felt_are_said() -> None:
         "3.8 times as stiff as the rest (1.8 to 11.8) around (20, 0, 30) mm, "
         "felt by pushes 1 and 4.",
         "Softer than the rest by 40 % (10 to 60) around (-10, 0, 30) mm, felt by push 2.",
-        "Free map of the stiffness: 31.2 nats over a uniform body, chance gives 4.0; told below "
+        "Free map of the stiffness: 31.2 nats over a uniform body, 4.0 are needed; told below "
         "42 % of the surface; the end towards -x was not felt.",
     ]
 
