@@ -14,6 +14,7 @@ from palpate.app.drawing.view import Quantity
 from palpate.app.reporting.json_values import finite
 from palpate.app.reporting.model_comparison import compared
 from palpate.app.reporting.sentences import registration_sentences, verdict_sentence
+from palpate.app.reporting.stiffness_sentences import stiffness_sentences
 from palpate.app.reporting.timeline_series import timeline_series
 from palpate.app.scene.model_layer import NO_INSIDE
 from palpate.app.server.pagination import RequestedPage, paginate
@@ -49,6 +50,7 @@ def one(name: str, services: CurrentServices) -> dict[str, Any]:
         **_heading(run),
         "sentence": verdict_sentence(run.report, size),
         "notes": registration_sentences(run.report),
+        "stiffness": stiffness_sentences(run.report),
         "size": size,
         "has_clouds": Path(run.origin.get("dataset", "")).is_dir() and "dataset" in run.origin,
         "sequences": [
@@ -154,7 +156,7 @@ def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, A
         "outcome": [int(code) for code in replay["outcome"]],
         "limits": {quantity: renderer.end(quantity) for quantity in get_args(Quantity)},
         "inside": NO_INSIDE if renderer.end("energy") is None else None,
-        "lumps": renderer.lumps,
+        "lumps": renderer.lumps + renderer.mapped,
         "landmarks": renderer.landmarks,
         "box": [[round(float(x), 6) for x in corner] for corner in renderer.corners],
         **timeline,

@@ -36,6 +36,7 @@ from palpate.app.reporting.sentences import (
     registration_sentences,
     verdict_sentence,
 )
+from palpate.app.reporting.stiffness_sentences import stiffness_sentences
 from palpate.foundation.errors import DatasetError, RunError
 from palpate.foundation.quantities import with_interval
 
@@ -196,6 +197,7 @@ def print_report(report: dict[str, Any]) -> None:
     lines += [Text(" ".join(sentence)) for sentence in [left_sentences(report)] if sentence]
     lines += [Text(sentence, style="dim") for sentence in registration_sentences(report)]
     lines += [Text(sentence) for sentence in palpation_sentences(report)]
+    lines += [Text(sentence) for sentence in stiffness_sentences(report)]
     lines += [
         Text(sentence, style="dim") for sentence in determined_sentences(report.get("causes", []))
     ]

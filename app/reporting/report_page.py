@@ -27,6 +27,7 @@ from palpate.app.reporting.sentences import (
     registration_sentences,
     verdict_sentence,
 )
+from palpate.app.reporting.stiffness_sentences import stiffness_sentences
 from palpate.app.storage.run_store import Run
 
 __all__ = ["report_page"]
@@ -62,6 +63,8 @@ def report_page(run: Run) -> str:
         patterns_note=_patterns_note(bool(causes)),
         palpation=_image(run, "palpation") if report.get("palpation") else "",
         palpation_note="; ".join(palpation_sentences(report)),
+        stiffness=stiffness_sentences(report),
+        stiffness_picture=_image(run, "stiffness"),
         ranking=ranking_table(report),
         limits=limit_table(report),
         controls=control_sentences(report.get("controls") or []),

@@ -14,6 +14,7 @@ from palpate.app.drawing import colours
 from palpate.app.drawing.figures import Figure, LinesFigure, SurfaceFigure, float32
 from palpate.app.drawing.surface_bands import IntArray, lattice
 from palpate.app.scene.model_layer import ModelLayer
+from palpate.app.scene.stiffness_surface import StiffnessSurface, stiffness_surface_of
 from palpate.app.storage.run_store import Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
@@ -60,6 +61,7 @@ class Annotations:
             extended model.
         lumps: balls among the causes.
         tubes: tubes among them.
+        stiffness: free map of the stiffness; None without one.
     """
 
     landmarks: FloatArray
@@ -67,6 +69,7 @@ class Annotations:
     loose: tuple[tuple[str, float], ...] = ()
     lumps: tuple[Lump, ...] = ()
     tubes: tuple[TubeAlong, ...] = ()
+    stiffness: StiffnessSurface | None = None
 
     @property
     def inclusions(self) -> int:
@@ -178,7 +181,8 @@ def annotations_of(run: Run) -> Annotations:
     strips = (setup.get("support") or {}).get("detached") or []
     loose = tuple((str(strip["edge"]), float(strip["extent"])) for strip in strips)
     causes = run.report.get("causes", [])
-    return Annotations(landmarks, touches, loose, tuple(_lumps(causes)), tuple(_tubes(causes)))
+    inclusions = tuple(_lumps(causes)), tuple(_tubes(causes))
+    return Annotations(landmarks, touches, loose, *inclusions, stiffness_surface_of(run.report))
 
 
 def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:

@@ -89,6 +89,11 @@ class SequenceRenderer:
         return self._annotations.inclusions
 
     @property
+    def mapped(self) -> bool:
+        """Whether there is a free map of the stiffness."""
+        return self._annotations.stiffness is not None
+
+    @property
     def landmarks(self) -> int:
         """Number of touched landmarks that can be shown."""
         return len(self._annotations.landmarks)
@@ -217,6 +222,10 @@ class SequenceRenderer:
             figures.update(self._annotations.base_figures(self._rest, layer.model != "raw"))
         if "lump" in view.layers and not (suffix and layer.model == "raw"):
             figures.update(self._annotations.lump_figures(layer, view.frame, view.opacity("lump")))
+            if (skin := self._annotations.stiffness) is not None:
+                surface, moved = self._surface(view.section, fine=True), layer.surface(view.frame)
+                opacity = view.opacity("lump")
+                figures.update(skin.figures(surface, self._rest, moved, opacity))
         return {f"{name}{suffix}": figure for name, figure in figures.items()}, points
 
     def _surface(self, section: Section | None, *, fine: bool) -> FineSurface:

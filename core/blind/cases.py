@@ -137,7 +137,7 @@ def all_cases(
     Raises:
         RunError: for an unknown effect.
     """
-    from palpate.synthetic import DISTURBANCES, HIDDEN
+    from palpate.synthetic import HIDDEN, WEIGHED_DISTURBANCES
 
     chosen, known = _checked_effects(effects), list(HIDDEN)
     cases = [
@@ -147,7 +147,7 @@ def all_cases(
     if effects is None:
         cases += [
             Case(f"{name}-{seed}", 1000 * seed + 401 + place, "outside", (name,), short)
-            for place, name in enumerate(DISTURBANCES)
+            for place, name in enumerate(WEIGHED_DISTURBANCES)
         ]
     return cases + [
         Case(f"control-{seed}-{place:02d}", 1000 * seed + 500 + place, "control", (), short)
@@ -180,13 +180,13 @@ def draw_cases(
         short: whether five sequences are recorded, not seven.
         shapes: whether phantoms have other shapes than a block, see `with_shapes`.
     """
-    from palpate.synthetic import DISTURBANCES, OF_ANY_BODY, ON_SHAPES
+    from palpate.synthetic import OF_ANY_BODY, ON_SHAPES, WEIGHED_DISTURBANCES
 
     mix = SHAPED if shapes else MIX
     chosen = _checked_kinds(list(SHAPED) if shapes and kinds is None else kinds)
     again = 2 * LOCATED if shapes and effects is None else ()
     effects = _checked_effects(ON_SHAPES if shapes and effects is None else effects)
-    disturbances = OF_ANY_BODY if shapes else tuple(DISTURBANCES)
+    disturbances = OF_ANY_BODY if shapes else WEIGHED_DISTURBANCES
     if controls is not None and controls > count:
         raise RunError(
             f"{controls} controls are more than the {count} scenarios in all", controls=controls

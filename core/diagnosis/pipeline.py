@@ -35,6 +35,9 @@ from palpate.diagnosis.report.error_patterns import draw_patterns, error_pattern
 from palpate.diagnosis.report.force_report import with_palpation
 from palpate.diagnosis.report.palpation_figure import draw_palpation
 from palpate.diagnosis.report.report import report_of, verdict_of
+from palpate.diagnosis.report.stiffness.map_figure import draw_map
+from palpate.diagnosis.report.stiffness.map_report import map_to_json
+from palpate.diagnosis.report.stiffness.stiffness_map import stiffness_map_of
 from palpate.diagnosis.report.supplements import with_supplements
 from palpate.diagnosis.search.findings import Findings
 from palpate.diagnosis.search.forward_selection import search
@@ -183,6 +186,8 @@ def _run(
     result["made_from"] = {**made, "seed": options.seed, "tolerance": options.tolerance.stated}
     if dataset.accepted is not None:
         result["registration"] = dataset.accepted.to_json()
+    pictures = making / "pictures"
+    result = _with_stiffness_map(result, evaluator, fitted, findings, pictures, options.seed)
     if options.assurance:
         result = with_supplements(result, evaluator, fitted, findings)
     result = _with_pictures(result, evaluator, fitted, findings, making)
@@ -226,6 +231,23 @@ def _validated(
     return gain, AllClearChecks(
         stiffness_error, check_held_out(evaluator, held_out, seed), options.tolerance
     )
+
+
+def _with_stiffness_map(
+    result: dict[str, Any],
+    evaluator: Evaluator,
+    fitted: Sequence[Observations],
+    findings: Findings,
+    pictures: Path,
+    seed: int,
+) -> dict[str, Any]:
+    """Add the free map of the stiffness to a report that leaves something open, and draw it."""
+    made = stiffness_map_of(evaluator, fitted, findings, result["verdict"], seed)
+    if made is None:
+        return result
+    if made.structured:
+        draw_map(pictures / "stiffness.png", evaluator.problem.setup.geometry, made)
+    return {**result, "stiffness_map": map_to_json(made)}
 
 
 def _with_pictures(

@@ -62,6 +62,11 @@ class DiagnosisResult:
         """Errors on the test sequences, without and with the causes; None without such."""
         return self.report.get("gain")
 
+    @property
+    def stiffness_map(self) -> Mapping[str, Any] | None:
+        """The free map of the stiffness; None where the causes leave nothing open."""
+        return self.report.get("stiffness_map")
+
     def plot_patterns(self, file: Path | str | None = None) -> Figure:
         """Draw the measured error pattern beside the pattern that the named causes predict.
 

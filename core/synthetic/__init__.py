@@ -26,6 +26,7 @@ from palpate.synthetic.nuisances import (
 from palpate.synthetic.scenario.disturbance import (
     DISTURBANCES,
     OF_ANY_BODY,
+    WEIGHED_DISTURBANCES,
     Disturbance,
     draw_disturbance,
 )
@@ -58,6 +59,7 @@ __all__ = [
     "ROBOT_RELATIONS",
     "SHORT_PROTOCOL",
     "WEIGHED",
+    "WEIGHED_DISTURBANCES",
     "Disturbance",
     "HiddenEffect",
     "Nuisance",

@@ -87,7 +87,7 @@ export function unavailableReason(layer) {
     return layer === "corrected"
       ? "No correction network was trained for this run"
       : "This run does not hold the model";
-  if (layer === "lump" && !series.lumps) return "No stiff lump was found in this run";
+  if (layer === "lump" && !series.lumps) return "Nothing of other stiffness was found in this run";
   if (layer === "landmarks" && !series.landmarks)
     return "This run does not say which landmarks were touched";
   return null;

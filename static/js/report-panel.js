@@ -13,6 +13,7 @@ import {
 import { openPanel } from "./panels.js";
 import { patternSection } from "./error-maps.js";
 import { clueRows, smallNote, unexplainedNote } from "./remaining-error.js";
+import { stiffnessMap } from "./stiffness-map.js";
 
 /**
  * @import {
@@ -90,6 +91,9 @@ export function showReport(heading, report, patterns, palette) {
           `${report.palpation.pushes} pushes`,
           palpationSummary(heading.id, report.palpation, causes),
         )
+      : null,
+    report.stiffness_map
+      ? section("Stiffness from place to place", "", stiffnessMap(heading, report))
       : null,
     report.ranking?.length
       ? section(

@@ -62,6 +62,7 @@ export interface RunEntry {
 export interface RunHeading extends RunEntry {
   sentence: string;
   notes?: string[];
+  stiffness?: string[];
   size: number[];
   has_clouds: boolean;
   sequences: SequenceEntry[];
@@ -245,6 +246,7 @@ export interface Report {
   causes?: Cause[];
   gain?: Gain;
   palpation?: Palpation;
+  stiffness_map?: { structured: boolean };
   ranking?: RankingEntry[];
   ambiguity_map?: AmbiguityRow[];
   controls?: ControlRow[];

@@ -33,6 +33,7 @@ from palpate.diagnosis.criteria.report_criteria import (
     DesignCriteria,
     FigureCriteria,
     FootprintCriteria,
+    StiffnessMapCriteria,
     VerdictCriteria,
 )
 from palpate.diagnosis.criteria.search_criteria import (
@@ -85,6 +86,7 @@ class Criteria:
     figures: FigureCriteria = field(default_factory=FigureCriteria)
     clues: ClueCriteria = field(default_factory=ClueCriteria)
     footprint: FootprintCriteria = field(default_factory=FootprintCriteria)
+    stiffness_map: StiffnessMapCriteria = field(default_factory=StiffnessMapCriteria)
     design: DesignCriteria = field(default_factory=DesignCriteria)
 
     @property

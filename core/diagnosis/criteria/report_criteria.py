@@ -13,6 +13,7 @@ __all__ = [
     "DesignCriteria",
     "FigureCriteria",
     "FootprintCriteria",
+    "StiffnessMapCriteria",
     "VerdictCriteria",
 ]
 
@@ -92,6 +93,15 @@ class FigureCriteria:
     least_force_change: float = threshold(
         5.0, "%", "Smallest change of the force that fills the colour scale."
     )
+    least_stiffness_change: float = threshold(
+        0.1, "1", "Smallest change of the logarithm of a stiffness that fills the colour scale."
+    )
+    facing: float = threshold(
+        0.05, "1", "Cosine to the eye from which on a triangle of the surface is drawn."
+    )
+    pushed_from: float = threshold(
+        0.5, "1", "Cosine of a push to the eye from which on it is drawn in a view."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,6 +151,71 @@ class FootprintCriteria:
     along: int = threshold(
         9, "1", "Points on each straight piece of a tube's axis that are compared with the pushes."
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessMapCriteria:
+    """The free map of the stiffness."""
+
+    cell: float = threshold(1.0, "1", "Edge of a cell of the map, in radii of the tool.")
+    reach: float = threshold(
+        3.0, "1", "Distance from a touched place up to which there are cells, in radii of the tool."
+    )
+    most_cells: int = threshold(400, "1", "Largest number of cells.")
+    growth: float = threshold(1.1, "1", "Factor on the edge of the cells while they are too many.")
+    lengths: tuple[float, ...] = threshold(
+        (1.0, 2.0, 4.0, 8.0),
+        "1",
+        "Correlation lengths of the stiffness that are tried, in radii of the tool.",
+    )
+    deviations: tuple[float, ...] = threshold(
+        (0.03, 0.06, 0.12, 0.25, 0.5),
+        "1",
+        "Prior deviations of the contrast (k - 1) / (k + 3/2) of a stiffness ratio k that are "
+        "tried.",
+    )
+    jitter: float = threshold(
+        1e-8, "1", "Share of the prior variance that is independent, so that it can be inverted."
+    )
+    least_weight: float = threshold(
+        1e-3, "1", "Prior widths and lengths of a smaller share of the evidence are left out."
+    )
+    draws: int = threshold(400, "1", "Draws of a uniform body with the data's noise.")
+    quantile: float = threshold(
+        0.99, "1", "Share of uniform bodies whose map is to be called noise."
+    )
+    least_gain: float = threshold(
+        12.0,
+        "nat",
+        "Smallest gain over a uniform body of a map that is shown, whatever the draws: the noise "
+        "model is not exact.",
+        "measured: two uniform bodies gain -1.9 and 3.2, uneven ones 32 to 112",
+    )
+    most_left: float = threshold(
+        0.7,
+        "1",
+        "Share of the prior deviation that the data may leave of a place that is trusted.",
+        "derived: the data then say as much of it as the prior",
+    )
+    accuracy: float = threshold(
+        0.04,
+        "1",
+        "Deviation of the contrast that the engine's own error leaves, however good the data.",
+        "measured: against an independent solver, of the contrast of lumps (suites 301 and 1400); "
+        "waves of stiffness of another solver lie in 98 % of the 95 % intervals with it, in 76 % "
+        "without",
+    )
+    carried: float = threshold(
+        0.5, "1", "Share of the strongest signal from which a push carries a part of the map."
+    )
+    joined: float = threshold(1.5, "1", "Distance of the cells of one part, in the longest edge.")
+    end_share: float = threshold(
+        0.2, "1", "Share of the body's length that is its end, of which is said if it is unfelt."
+    )
+    end_told: float = threshold(
+        0.1, "1", "Smallest trusted share of the surface of an end that is not called unfelt."
+    )
+    most_spots: int = threshold(5, "1", "Largest number of parts that are listed.")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,7 @@ from palpate.synthetic.laws.stiffness_fields import (
     layer_factor,
     uneven_density,
     uneven_poisson_ratio,
+    wave_factor,
 )
 from palpate.synthetic.laws.support_laws import is_bonded, side_of, spring_factor
 from palpate.synthetic.laws.tool_laws import offset_at
@@ -163,6 +164,8 @@ def _modulus(scenario: Scenario, block: TetBlock) -> FloatArray:
         modulus *= layer_factor(skin, below)
     if slope is not None:
         modulus *= gradient_factor(slope, block.places[..., 2] / height)
+    if (waves := scenario.disturbance("stiffness_waves")) is not None:
+        modulus *= wave_factor(waves, block.places)
     return modulus
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
+from palpate.synthetic.scenario.disturbance import Disturbance
 from palpate.synthetic.scenario.hidden_effects import HiddenEffect
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "tube_axis",
     "uneven_density",
     "uneven_poisson_ratio",
+    "wave_factor",
 ]
 
 _HALF_AXES = np.array([1.25, 0.85, 0.94])
@@ -140,6 +142,14 @@ def gradient_factor(hidden: HiddenEffect, height: FloatArray) -> FloatArray:
     if not hidden.second_law:
         return np.asarray(np.exp(ratio * (height - 0.5)))
     return np.asarray(1.0 + 2.0 * np.tanh(0.5 * ratio) * (height - 0.5))
+
+
+def wave_factor(waves: Disturbance, places: FloatArray) -> FloatArray:
+    """Return the factor (...) [1] on stiffness at places (..., 3) [m], by waves in the plane."""
+    turn = waves.value("direction")
+    way = places[..., :2] @ np.array([np.cos(turn), np.sin(turn)])
+    angle = 2 * np.pi * way / waves.value("period") + waves.value("phase")
+    return np.asarray(np.exp(waves.value("amplitude") * np.sin(angle)))
 
 
 def uneven_poisson_ratio(hidden: HiddenEffect | None, height: FloatArray) -> FloatArray | float:

@@ -4,7 +4,7 @@ No effect expresses them, so a diagnosis should name no single cause. A camera t
 and shifts during a sequence and is exact half way. Depth ripples with the distance, as interference
 between cameras causes it. The phantom creeps sideways on its table. Another soft body lies against
 a side that the camera does not see. The shaft of an upright tool touches the rim of the top while
-its ball is pushed into a side.
+its ball is pushed into a side. Stiffness goes up and down in waves across the body.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
 from palpate.synthetic.scenario.parameter_names import check_named
 
-__all__ = ["DISTURBANCES", "OF_ANY_BODY", "Disturbance", "draw_disturbance", "drifted", "rippled"]
+__all__ = [
+    "DISTURBANCES",
+    "OF_ANY_BODY",
+    "WEIGHED_DISTURBANCES",
+    "Disturbance",
+    "draw_disturbance",
+    "drifted",
+    "rippled",
+]
 
 DISTURBANCES: Mapping[str, Mapping[str, str]] = {
     "camera_drift": {"translation": "m", "rotation": "rad"},
@@ -26,6 +34,7 @@ DISTURBANCES: Mapping[str, Mapping[str, str]] = {
     "phantom_creep": {"speed": "m/s", "direction": "rad"},
     "second_body": {"overlap": "m", "stiffness_over_E": "1/m", "side": ""},
     "shaft_contact": {"lean": "rad"},
+    "stiffness_waves": {"amplitude": "1", "period": "m", "direction": "rad", "phase": "rad"},
 }
 """Disturbances of the virtual bench, with the unit of each parameter.
 
@@ -35,11 +44,15 @@ beginning. `depth_ripple`: depth z is read as z (1 + amplitude sin(2 pi z / peri
 put back after each. `second_body`: its overlap with the block if it were rigid, its pressure per
 displacement over the block's modulus, and the side it lies against, which the camera does not see;
 it is black, so the camera does not see it either. `shaft_contact`: angle of the shaft from the
-vertical, over the block, in pushes from the side.
+vertical, over the block, in pushes from the side. `stiffness_waves`: the logarithm of the stiffness
+is amplitude sin(2 pi s / period + phase) at a way s along the direction (in the plane, from x).
 """
 OF_ANY_BODY = ("camera_drift", "depth_ripple", "phantom_creep")
 """Those that any body can have: a second body needs an upright side to lie against, and a shaft the
 rim of a level top."""
+WEIGHED_DISTURBANCES = tuple(name for name in DISTURBANCES if name != "stiffness_waves")
+"""The disturbances that suites draw from; waves of stiffness are made where they are asked for, so
+that a seed draws what it always drew."""
 _Range = tuple[float, float] | tuple[str, str, str, str]
 _CLEAR: Mapping[str, Mapping[str, _Range]] = {
     "camera_drift": {"translation": (1.0e-3, 2.0e-3), "rotation": (0.008, 0.016)},
@@ -51,6 +64,12 @@ _CLEAR: Mapping[str, Mapping[str, _Range]] = {
         "side": ("-x", "+x", "-y", "+y"),
     },
     "shaft_contact": {"lean": (0.0, 0.12)},
+    "stiffness_waves": {
+        "amplitude": (0.4, 0.7),
+        "period": (40e-3, 60e-3),
+        "direction": (0.0, 3.14),
+        "phase": (0.0, 6.28),
+    },
 }
 
 

@@ -21,6 +21,7 @@ from palpate.app.scene.annotations import TICK, TICKS_APART, Annotations, annota
 from palpate.app.scene.page_session import Session
 from palpate.app.scene.picture import Picture
 from palpate.app.scene.sequence_renderer import MOST_TRIANGLES, SequenceRenderer
+from palpate.app.scene.stiffness_surface import StiffnessSurface
 from palpate.app.storage.run_store import Run
 from palpate.setup.box import Box
 
@@ -207,6 +208,23 @@ def test_a_section_leaves_out_what_lies_beyond_and_the_cloud_there(
     assert len(show(renderer, section=cut).of(LinesFigure)["raw-lines"].segments) < len(
         show(renderer).of(LinesFigure)["raw-lines"].segments
     )
+
+
+def test_map_of_the_stiffness_is_a_skin_over_the_moved_body(renderer: SequenceRenderer) -> None:
+    rest = np.asarray(renderer.replay["rest"], dtype=float)
+    known = np.where(rest[:, 0] > 0, 0.3, np.nan)
+    notes = Annotations(np.zeros((0, 3)), np.zeros((0, 3)), stiffness=StiffnessSurface(rest, known))
+    mapped = SequenceRenderer(renderer.replay, None, notes)
+    assert mapped.mapped and not renderer.mapped
+    shown = show(mapped, layers=("raw", "lump")).of(SurfaceFigure)
+    skin = {name: figure for name, figure in shown.items() if name.startswith("stiffness")}
+    assert set(skin) == {"stiffness-unseen", f"stiffness-{BANDS - 1:02d}"}
+    low, high = (
+        np.concatenate([figure.vertices for figure in figures]).min(axis=0)
+        for figures in (skin.values(), [shown["raw"]])
+    )
+    assert np.abs(low - high).max() < 1e-3  # just outside the body
+    assert "stiffness-unseen" not in show(mapped, layers=("raw",)).of(SurfaceFigure)
 
 
 def test_lump_landmarks_base_and_path_are_layers(renderer: SequenceRenderer) -> None:

@@ -33,6 +33,7 @@ from palpate.synthetic import (
     ROBOT_RELATIONS,
     SHORT_PROTOCOL,
     WEIGHED,
+    WEIGHED_DISTURBANCES,
     ShapeScenario,
 )
 
@@ -46,7 +47,7 @@ def effects_of(cases: list[Case]) -> list[str]:
 def test_small_suite_has_each_effect_and_disturbance_once_and_ten_controls() -> None:
     cases = all_cases(seed=3)
     assert [case.hidden for case in cases if case.hidden] == [
-        (name,) for name in (*WEIGHED, *DISTURBANCES)
+        (name,) for name in (*WEIGHED, *WEIGHED_DISTURBANCES)
     ]
     assert sum(case.kind == "control" for case in cases) == 10
     assert len({case.name for case in cases}) == len({case.seed for case in cases}) == len(cases)

@@ -23,9 +23,12 @@ from palpate.synthetic import (
 )
 from palpate.synthetic.bench.motion_plan import MotionPlan
 from palpate.synthetic.bench.solved_track import SolvedTrack
+from palpate.synthetic.bench.true_body import solid_model
 from palpate.synthetic.bench.virtual_experiment import solve_motion
+from palpate.synthetic.laws.stiffness_fields import wave_factor
 from palpate.synthetic.make_dataset import motions
 from palpate.synthetic.scenario.disturbance import drifted, rippled
+from palpate.synthetic.solver.tet_block import TetGrading, mesh_block
 
 DRIFT = Disturbance("camera_drift", {"translation": 1.5e-3, "rotation": 0.02})
 RIPPLE = Disturbance("depth_ripple", {"amplitude": 2e-3, "period": 20e-3})
@@ -51,6 +54,24 @@ def test_depth_ripples_about_the_truth() -> None:
     assert np.abs(off).max() == pytest.approx(2e-3, rel=1e-3)
     assert abs(off.mean()) < 1e-5
     assert np.allclose(rippled([RIPPLE], depth + 20e-3) / (depth + 20e-3) - 1.0, off)
+
+
+def test_stiffness_goes_up_and_down_along_its_direction_alone() -> None:
+    numbers = {"amplitude": 0.5, "period": 0.04, "direction": 0.5 * np.pi, "phase": 0.0}
+    waves = Disturbance("stiffness_waves", numbers)
+    way = np.linspace(-0.02, 0.02, 5)
+    along, across = (np.zeros((5, 3)) for _ in range(2))
+    along[:, 1] = way
+    across[:, 0], across[:, 2] = way, 0.01
+    assert np.log(wave_factor(waves, along)) == pytest.approx([0.0, -0.5, 0.0, 0.5, 0.0])
+    assert wave_factor(waves, across) == pytest.approx(1.0)
+    block = mesh_block(
+        Scenario().size, TetGrading(np.zeros((1, 3)), np.zeros(1), np.full(1, 0.012))
+    )
+    even, uneven = (
+        solid_model(Scenario(disturbances=one), block).young_modulus for one in ((), (waves,))
+    )
+    assert uneven == pytest.approx(even * wave_factor(waves, block.places))
 
 
 def test_no_disturbance_disturbs_nothing() -> None:
