@@ -87,7 +87,8 @@ class ViserPairScene:
         """Name, digest and maker of every node."""
         yield "/cloud", (_key(picture.cloud), partial(self._cloud, picture.cloud))
         yield "/block", (_key(picture.vertices), partial(self._block, picture))
-        yield "/edges", (_key(picture.vertices), partial(self._edges, picture.vertices))
+        if len(picture.edges):
+            yield "/edges", (_key(picture.edges), partial(self._edges, picture.edges))
         for label, place in zip(picture.names, picture.landmarks, strict=True):
             yield f"/landmarks/{label}", (_key(place), partial(self._landmark, label, place))
         for mark in picture.marks:
@@ -157,10 +158,9 @@ class ViserPairScene:
             receive_shadow=False,
         )
 
-    def _edges(self, vertices: FloatArray) -> Any:
-        edges = vertices.astype(np.float32)[np.array(_box_edges(vertices))]
+    def _edges(self, edges: FloatArray) -> Any:
         return self._client.scene.add_line_segments(
-            "/edges", edges, EDGE, thickness=1.4, thickness_units="screen"
+            "/edges", edges.astype(np.float32), EDGE, thickness=1.4, thickness_units="screen"
         )
 
     def _landmark(self, name: str, place: FloatArray) -> Any:
@@ -252,9 +252,3 @@ def _ring(centre: FloatArray, axis: FloatArray) -> FloatArray:
     radius = 0.45 * float(np.linalg.norm(axis))
     circle = centre + radius * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other)
     return np.stack([circle[:-1], circle[1:]], axis=1).astype(np.float32)
-
-
-def _box_edges(corners: FloatArray) -> list[tuple[int, int]]:
-    """Pairs of the eight corners of a box that differ along one axis only."""
-    same = np.abs(corners[:, None] - corners[None]) < 1e-9
-    return [(i, j) for i in range(len(corners)) for j in range(i) if same[i, j].sum() == 2]
