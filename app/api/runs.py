@@ -169,7 +169,7 @@ def _height_map(found: HeightMap) -> dict[str, Any]:
     return {
         "corner": finite(found.corner, digits=6),
         "spacing": finite(found.spacing, digits=7),
-        "heights": finite(found.heights, digits=5),
+        "heights": finite(found.heights, digits=6),
     }
 
 

@@ -114,9 +114,7 @@ def _outline(vertices: FloatArray, faces: IntArray, axis: int, at: float) -> Flo
     crossed = faces[(count > 0) & (count < 3)]
     side = above[crossed]
     alone = np.where(side.sum(axis=1) == 1, side.argmax(axis=1), side.argmin(axis=1))
-    tip, one, other = np.take_along_axis(
-        crossed, (alone[:, None] + np.arange(3)) % 3, axis=1
-    ).T
+    tip, one, other = np.take_along_axis(crossed, (alone[:, None] + np.arange(3)) % 3, axis=1).T
     ends = []
     for far in (one, other):
         share = (at - vertices[tip, axis]) / (vertices[far, axis] - vertices[tip, axis])

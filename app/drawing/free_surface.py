@@ -17,9 +17,9 @@ __all__ = ["FreeSurface", "HeightMap", "creases"]
 
 SAME = 1e-6
 """Vertices closer than this are one [m]."""
-MOST_CELLS = 64
+MOST_CELLS = 96
 """Cells of a height map along the longer edge."""
-FINEST = 1e-3
+FINEST = 7.5e-4
 """Least edge length of a cell of a height map [m]."""
 
 

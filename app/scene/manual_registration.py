@@ -189,7 +189,10 @@ class ManualRegistration:
                     marks.append(Mark(number, side, ends[side], shown.chosen == (number, side)))
             if len(ends) == 2:
                 lines.append((ends["cloud"], ends["mesh"], number))
-        names, (bottom, high) = tuple(phantom.landmarks), (phantom.geometry.low, phantom.geometry.high)
+        names, (bottom, high) = (
+            tuple(phantom.landmarks),
+            (phantom.geometry.low, phantom.geometry.high),
+        )
         top = np.array([*(bottom + high)[:2] / 2, high[2]])
         return PairPicture(
             cloud=pose.apply(phantom.cloud),

@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from palpate.app.drawing import colours
 from palpate.app.scene.registration_picture import Arrow, Mark, PairPicture, pair_colour
@@ -21,8 +22,14 @@ if TYPE_CHECKING:
 
 __all__ = ["PairScene", "Ray", "ViserPairScene"]
 
-POINT_SIZE = 0.0007
-"""Size of a point of the cloud [m]."""
+POINT_SIZES = (0.0003, 0.0007)
+"""Least and largest size of a point of the cloud [m]."""
+GAPLESS = 0.6
+"""Size of a point over the typical distance of neighbours, at which their relief shows [1]."""
+SAMPLED = 500
+"""Points by which that distance is measured."""
+SHADES = (0.35, 1.25)
+"""Brightness of the lowest and of the highest points [1]."""
 BALL, CHOSEN = 0.0011, 0.0016
 """Radius of a mark, and of the selected one [m]."""
 BLOCK, EDGE, LANDMARK, WEAK = (176, 184, 196), (96, 106, 120), (110, 120, 134), (205, 60, 60)
@@ -140,8 +147,8 @@ class ViserPairScene:
         return self._client.scene.add_point_cloud(
             "/cloud",
             points.astype(np.float32),
-            colours.MEASURED,
-            point_size=POINT_SIZE,
+            by_height(points[:, 2]),
+            point_size=size_of_points(points),
             point_shape="circle",
             precision="float32",
             point_shading="flat",
@@ -236,6 +243,25 @@ class ViserPairScene:
             anchor="bottom-center",
         )
         return root
+
+
+def by_height(heights: FloatArray) -> Any:
+    """Colours (n, 3) of points by their heights (n,) [m], the lowest dark: on a smooth body nothing
+    else shows in which place a point lies.
+    """
+    low, high = np.percentile(heights, [2, 98]) if len(heights) else (0.0, 1.0)
+    share = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)[:, None]
+    bright = SHADES[0] + share * (SHADES[1] - SHADES[0])
+    return np.clip(bright * np.array(colours.MEASURED), 0, 255).astype(np.uint8)
+
+
+def size_of_points(points: FloatArray) -> float:
+    """Size [m] at which points (n, 3) [m] are drawn: the smaller, the denser they are."""
+    sample = points[:: 1 + len(points) // SAMPLED]
+    if len(points) < 2:
+        return POINT_SIZES[1]
+    apart = cKDTree(points).query(sample, k=2)[0][:, 1]
+    return float(np.clip(GAPLESS * np.median(apart), *POINT_SIZES))
 
 
 def _key(array: Any) -> str:

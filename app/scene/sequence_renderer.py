@@ -144,9 +144,7 @@ class SequenceRenderer:
                 )
                 drawn = {**drawn, **around}
             if alone:
-                drawn[f"name-{model}"] = LabelFigure(
-                    NAMES[model], self._over_middle(0.03)
-                )
+                drawn[f"name-{model}"] = LabelFigure(NAMES[model], self._over_middle(0.03))
             figures.update({name: replace(figure, at=at) for name, figure in drawn.items()})
         if not models:
             figures, points = self._around(view, self.layers["raw"], "")

@@ -16,7 +16,6 @@ from palpate.app.reporting.timeline_series import (
 )
 from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.fem.newton import Outcome
-from palpate.foundation.arrays import FloatArray
 
 
 @pytest.fixture
@@ -60,9 +59,7 @@ def test_depth_in_a_free_form_is_measured_along_its_normals(replay: RecordedRepl
     normals = body.facing(places)[1]
     deep = np.linspace(-0.002, 0.003, len(places))
     centres = places + (0.005 - deep)[:, None] * normals
-    found = push_depth(
-        moved(replay, rest=surface.vertices, faces=surface.faces, tool_raw=centres)
-    )
+    found = push_depth(moved(replay, rest=surface.vertices, faces=surface.faces, tool_raw=centres))
     np.testing.assert_allclose(found, np.maximum(deep, 0.0), atol=1e-4)
 
 
