@@ -92,13 +92,13 @@ def _in_file_frame(places: dict[str, Any]) -> list[tuple[str, Cell, str]]:
         *zip(("one end", "other end"), line[:: len(line) - 1 or 1], strict=False),
     ]
     return [
-        (f"{name}, in the file's frame", Cell(_millimetres(place), style="b"), "")
+        (f"{name}, in the file's frame", Cell(_place(place), style="b"), "")
         for name, place in named
         if place
     ]
 
 
-def _millimetres(place: Sequence[float]) -> str:
+def _place(place: Sequence[float]) -> str:
     return f"({', '.join(f'{1e3 * value:.1f}' for value in place)}) mm"
 
 

@@ -248,7 +248,7 @@ class SequenceRenderer:
         return self._edges if section is None else self._cut_by(section).edges
 
     def _cut_by(self, section: Section) -> _Cut:
-        """What remains in a section; the last result is cached."""
+        """The rest that a section leaves; the last result is cached."""
         cut = self._cut
         if cut is None or cut.section != section:
             surfaces = {

@@ -17,7 +17,7 @@ export function nearestSpot({ corner, spacing, heights }, x, y) {
   const column = Math.round((x - corner[0]) / spacing);
   const row = Math.round((y - corner[1]) / spacing);
   const here = heights[row]?.[column];
-  if (here != null) return { x, y, z: here };
+  if (typeof here === "number") return { x, y, z: here };
   let found = { x, y, z: 0 };
   let least = Infinity;
   heights.forEach((line, i) =>
@@ -71,10 +71,10 @@ export function reliefPicture({ heights }) {
   canvas.height = heights.length;
   const pen = canvas.getContext("2d");
   const known = heights.flat().filter((z) => z !== null);
-  const [low, high] = known.reduce(([a, b], z) => [Math.min(a, z), Math.max(b, z)], [
-    Infinity,
-    -Infinity,
-  ]);
+  const [low, high] = known.reduce(
+    ([a, b], z) => [Math.min(a, z), Math.max(b, z)],
+    [Infinity, -Infinity],
+  );
   heights.forEach((line, i) =>
     line.forEach((z, j) => {
       if (z === null || !pen || high - low < 1e-4) return;

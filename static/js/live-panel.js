@@ -9,7 +9,8 @@ import { addPanel, openedPanel } from "./panels.js";
 import { onViewerLoad, pageId, refreshScene } from "./scene.js";
 import { subscribe, set, state } from "./store.js";
 
-/** @import { EffectValues, HeightMap, LiveAnswer, Point, ViewerWindow, WhatIfRow } from "./types.js" */
+/** @import { EffectValues, HeightMap, LiveAnswer, Point } from "./types.js" */
+/** @import { ViewerWindow, WhatIfRow } from "./types.js" */
 
 /** @type {Record<string, string>} */
 const MODELS = { raw: "Raw model", extended: "Extended model", whatif: "As set under What if" };

@@ -1,4 +1,4 @@
-"""The free surface of a body as one mesh: closed, bordered where it is held, and seen from above."""
+"""The free surface of a body as one mesh: closed, bordered where it is held, seen from above."""
 
 from __future__ import annotations
 
