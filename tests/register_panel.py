@@ -102,11 +102,11 @@ class RegisterPanel:
         box = self.page.page.locator("#register-viewer").bounding_box()
         return float(box["x"] + left), float(box["y"] + top)
 
-    def pair(self, corner: Any, mesh: Any = None) -> None:
+    def pair(self, corner: Any, mesh: Any = None, inside: float = 0.97) -> None:
         """Click a corner on the cloud, slightly inside of it, and then on the phantom."""
         count = len(self.values["pairs"])
         self.click(
-            self.shown().apply(self.true.inverse().apply(corner * np.array([0.97, 0.97, 1.0])))
+            self.shown().apply(self.true.inverse().apply(corner * np.array([inside, inside, 1.0])))
         )
         self.page.until(
             lambda: len(self.values["pairs"]) == count + 1 and self.values["mode"] == "mesh"

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse, HTMLResponse
 
 from palpate.app.drawing.colours import nice_limit
+from palpate.app.drawing.free_surface import HeightMap
 from palpate.app.drawing.view import Quantity
 from palpate.app.reporting.json_values import finite
 from palpate.app.reporting.model_comparison import compared
@@ -137,7 +138,8 @@ def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, A
     the scene can show.
 
     `limits` are the robust ends of the scales, null where the run does not contain a quantity;
-    `inside` says why the interior is missing.
+    `inside` says why the interior is missing; `height_map` has the heights [m] of the free surface
+    seen from above, rows along y, null where there is none.
     """
     renderer = services.sessions.renderer(name, sequence)
     replay = renderer.replay
@@ -159,7 +161,17 @@ def sequence(name: str, sequence: str, services: CurrentServices) -> dict[str, A
         "lumps": renderer.lumps + renderer.mapped,
         "landmarks": renderer.landmarks,
         "box": [[round(float(x), 6) for x in corner] for corner in renderer.corners],
+        "height_map": _height_map(renderer.body.height_map),
         **timeline,
+    }
+
+
+def _height_map(found: HeightMap) -> dict[str, Any]:
+    """Plain values of a map, SI."""
+    return {
+        "corner": finite(found.corner, digits=6),
+        "spacing": finite(found.spacing, digits=7),
+        "heights": finite(found.heights, digits=6),
     }
 
 

@@ -1,4 +1,4 @@
-"""Sections through a block: the remaining surface, and the cut face."""
+"""Sections through a body: the remaining surface, and the cut face."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from palpate.foundation.arrays import FloatArray
 
 __all__ = ["clipped", "cut_face", "depth_inside"]
 
-CAP_SPACING = 1.2e-3
+CAP_SPACING = 1.0e-3
 """Approximate spacing of the points on a cut face [m]."""
+_TOUCHES = 1e-9
+"""Points closer to an outline than this lie on it [m]."""
 
 
 def depth_inside(section: Section, places: FloatArray) -> FloatArray:
@@ -28,7 +30,13 @@ def clipped(surface: FineSurface, rest: FloatArray, section: Section) -> FineSur
     New points are weighted means of the same coarse vertices (v, 3) [m], so that they move with the
     material.
     """
-    inside = depth_inside(section, surface.spread(rest))
+    return _where(surface, depth_inside(section, surface.spread(rest)))
+
+
+def _where(surface: FineSurface, inside: FloatArray) -> FineSurface:
+    """The part of a surface in which a linear function, with values (n,) at its points, is not
+    negative.
+    """
     good = inside >= 0
     count = good[surface.faces].sum(axis=1)
     whole = surface.faces[count == 3]
@@ -67,21 +75,65 @@ def _between(
 
 
 def cut_face(
-    low: FloatArray, high: FloatArray, section: Section
+    vertices: FloatArray, faces: IntArray, section: Section
 ) -> tuple[FloatArray, IntArray] | None:
-    """Places (n, 3) [m] at rest and triangles (m, 3) of the cut face of a block.
+    """Places (n, 3) [m] at rest and triangles (m, 3) of the cut face of a body.
 
-    `low` and `high` are the corners (3,) of the block. None where the plane misses it.
+    A grid over the plane is cut along the body's outline in it. None where the plane misses it.
+
+    Args:
+        vertices: (v, 3) of the closed surface [m].
+        faces: (t, 3) of the closed surface.
+        section: the plane.
     """
     axis = "xyz".index(section.axis)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
     if not low[axis] < section.at < high[axis]:
         return None
     across = [other for other in range(3) if other != axis]
-    steps = [max(2, int(np.ceil((high[other] - low[other]) / CAP_SPACING)) + 1) for other in across]
-    grid = np.meshgrid(
-        *(np.linspace(low[other], high[other], n) for other, n in zip(across, steps, strict=True)),
-        indexing="ij",
-    )
-    places = np.full((grid[0].size, 3), float(section.at))
-    places[:, across[0]], places[:, across[1]] = grid[0].ravel(), grid[1].ravel()
-    return places, lattice(steps[0], steps[1])
+    outline = _outline(vertices, faces, axis, section.at)[:, :, across]
+    if not len(outline):
+        return None
+    start, end = outline.min(axis=(0, 1)), outline.max(axis=(0, 1))
+    steps = [max(2, int(np.ceil(length / CAP_SPACING)) + 1) for length in end - start]
+    axes = (np.linspace(a, b, n) for a, b, n in zip(start, end, steps, strict=True))
+    flat = np.stack([part.ravel() for part in np.meshgrid(*axes, indexing="ij")], axis=1)
+    rows = np.arange(len(flat))[:, None]
+    grid = FineSurface(rows, np.ones(rows.shape), lattice(steps[0], steps[1]))
+    part = _where(grid, _depth_in_outline(flat, outline))
+    used, turned = np.unique(part.faces, return_inverse=True)
+    places = np.full((len(used), 3), float(section.at))
+    places[:, across] = part.spread(flat)[used]
+    return (places, turned.reshape(-1, 3)) if len(used) else None
+
+
+def _outline(vertices: FloatArray, faces: IntArray, axis: int, at: float) -> FloatArray:
+    """Segments (s, 2, 3) [m] in which the triangles meet a plane across an axis."""
+    above = vertices[:, axis] > at
+    count = above[faces].sum(axis=1)
+    crossed = faces[(count > 0) & (count < 3)]
+    side = above[crossed]
+    alone = np.where(side.sum(axis=1) == 1, side.argmax(axis=1), side.argmin(axis=1))
+    tip, one, other = np.take_along_axis(crossed, (alone[:, None] + np.arange(3)) % 3, axis=1).T
+    ends = []
+    for far in (one, other):
+        share = (at - vertices[tip, axis]) / (vertices[far, axis] - vertices[tip, axis])
+        ends.append(vertices[tip] + share[:, None] * (vertices[far] - vertices[tip]))
+    return np.stack(ends, axis=1)
+
+
+def _depth_in_outline(points: FloatArray, outline: FloatArray) -> FloatArray:
+    """Distance (n,) [m] of points (n, 2) to closed lines of segments (s, 2, 2), negative outside;
+    a point is inside if a ray from it crosses the lines an odd number of times.
+    """
+    inside, nearest = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
+    for begin, end in outline:
+        along, away = end - begin, points - begin
+        share = np.clip(away @ along / max(float(along @ along), 1e-30), 0.0, 1.0)
+        nearest = np.minimum(nearest, np.linalg.norm(away - share[:, None] * along, axis=1))
+        spans = (begin[1] > points[:, 1]) != (end[1] > points[:, 1])
+        if spans.any():
+            meets = begin[0] + (points[:, 1] - begin[1]) / (end[1] - begin[1]) * along[0]
+            inside ^= spans & (points[:, 0] < meets)
+    nearest[nearest < _TOUCHES] = 0.0
+    return np.where(inside, nearest, -nearest)

@@ -16,6 +16,9 @@ __all__ = ["WarmProcess"]
 T = TypeVar("T")
 _PATIENCE = 60.0
 """Longest time of a task [s]: of a frame without an equilibrium, or with a long history."""
+_SET_UP = 600.0
+"""Longest time until a model is set up [s]: its dataset is read and registered, its mesh made, and
+at the first time its code compiled."""
 
 
 class WarmProcess:
@@ -30,17 +33,26 @@ class WarmProcess:
         """Run a task and return its result; raises RunError where it takes too long or its process
         ends.
         """
+        late = "this frame was not solved within {:.0f} s; take values nearer to the model's"
+        return self._run(self._patience, late, task, *args)
+
+    def set_up(self, task: Callable[..., object], *args: Any) -> None:
+        """Run a task on whose result later ones build, which may take minutes; raises RunError as
+        `ask`.
+        """
+        late = "the model was not set up within {:.0f} s; end other programs, and try again"
+        self._run(_SET_UP, late, task, *args)
+
+    def _run(self, patience: float, late: str, task: Callable[..., T], *args: Any) -> T:
+        """Run a task; `late` says that it took longer than this patience [s]."""
         with self._lock:
             if self._pool is None:
                 self._pool = ProcessPool(1)
             try:
-                return self._pool.submit(task, *args).result(self._patience)
+                return self._pool.submit(task, *args).result(patience)
             except TooLong:
                 self._end()
-                raise RunError(
-                    f"this frame was not solved within {self._patience:.0f} s; "
-                    "take values nearer to the model's"
-                ) from None
+                raise RunError(late.format(patience)) from None
             except BrokenProcessPool:
                 self._end()
                 raise RunError(

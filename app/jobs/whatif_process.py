@@ -27,6 +27,7 @@ class FrameSolver(WarmProcess):
 
     def beginnings(self, run: Run, sequence: str) -> list[dict[str, Any]]:
         """An instance of each effect with a finite size, as a starting point for changes."""
+        self.set_up(_open, *_key(run, sequence))
         return self.ask(_beginnings, *_key(run, sequence))
 
     def solve(
@@ -35,6 +36,7 @@ class FrameSolver(WarmProcess):
         """Solve the frame with these effects; raises RunError where this takes too long or the
         process ends.
         """
+        self.set_up(_open, *_key(run, sequence))
         return self.ask(_solve, *_key(run, sequence), frame, effects, tuned)
 
 
@@ -71,6 +73,7 @@ class InteractiveSolver(WarmProcess):
         """Solve with the tool's centre there [m]; raises RunError where this takes too long or the
         process ends.
         """
+        self.set_up(_open_live, session)
         return self.ask(_interactive_frame, session, centre, within)
 
 
@@ -88,6 +91,12 @@ def _key(run: Run, sequence: str) -> tuple[str, str, tuple[int, ...], str]:
         )
     clouds = tuple(int(index) for index in run.replay(sequence)["cloud_index"])
     return str(folder), sequence, clouds, json.dumps(run.model)
+
+
+def _open(folder: str, sequence: str, clouds: tuple[int, ...], model: str) -> None:
+    from palpate.recording.resolve_frame import open_resolver
+
+    open_resolver(folder, sequence, clouds, model)
 
 
 def _beginnings(
@@ -116,11 +125,12 @@ def _solve(
 _replays: OrderedDict[str, InteractiveReplay] = OrderedDict()
 
 
-def _interactive_frame(
-    session: InteractiveSession, centre: tuple[float, float, float], within: bool
-) -> InteractiveFrame:
-    import numpy as np
+def _open_live(session: InteractiveSession) -> None:
+    """Set an interactive replay up, unless it is there, and touch nothing with its tool."""
+    _live(session)
 
+
+def _live(session: InteractiveSession) -> InteractiveReplay:
     from palpate.recording.resolve_frame import open_resolver
     from palpate.recording.saved_model import effects_from
 
@@ -131,4 +141,12 @@ def _interactive_frame(
     _replays[key] = live
     while len(_replays) > MOST_REPLAYS:
         _replays.popitem(last=False)
-    return live.at(np.array(centre), within=within)
+    return live
+
+
+def _interactive_frame(
+    session: InteractiveSession, centre: tuple[float, float, float], within: bool
+) -> InteractiveFrame:
+    import numpy as np
+
+    return _live(session).at(np.array(centre), within=within)

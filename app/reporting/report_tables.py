@@ -78,9 +78,28 @@ def named_causes(causes: Sequence[dict[str, Any]]) -> list[NamedCause]:
             (words(name), Cell(value_and_ends(entry)[0], style="b"), _interval(entry))
             for name, entry in cause.get("parameters", {}).items()
         ]
+        rows += _in_file_frame(cause.get("in_file_frame", {}))
         table = Table(("", "value", "interval"), rows)
         named.append(NamedCause(cause["effect"], percent(cause.get("probability")), table))
     return named
+
+
+def _in_file_frame(places: dict[str, Any]) -> list[tuple[str, Cell, str]]:
+    """Rows of the places of a cause in the frame of the dataset's files."""
+    line = places.get("polyline") or []
+    named = [
+        ("centre", places.get("centre")),
+        *zip(("one end", "other end"), line[:: len(line) - 1 or 1], strict=False),
+    ]
+    return [
+        (f"{name}, in the file's frame", Cell(_place(place), style="b"), "")
+        for name, place in named
+        if place
+    ]
+
+
+def _place(place: Sequence[float]) -> str:
+    return f"({', '.join(f'{1e3 * value:.1f}' for value in place)}) mm"
 
 
 def _interval(entry: dict[str, Any]) -> str:

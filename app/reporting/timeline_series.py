@@ -11,7 +11,7 @@ import numpy as np
 from palpate.app.reporting.json_values import finite
 from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.fem.newton import Outcome
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import PalpateError
 
 __all__ = [
@@ -43,8 +43,8 @@ def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
     iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")
     return {
         "models": list(models_of(replay)),
-        "depth": None if depth is None else finite(depth, digits=7),
-        "touching": [] if depth is None else touching(depth),
+        "depth": finite(depth, digits=7),
+        "touching": touching(depth),
         "force": None if force is None else finite(force, digits=5),
         "forces": {name: finite(values, digits=5) for name, values in forces.items()} or None,
         "iterations": {
@@ -79,22 +79,40 @@ def models_of(replay: RecordedReplay) -> tuple[str, ...]:
     )
 
 
-def push_depth(replay: RecordedReplay) -> FloatArray | None:
+def push_depth(replay: RecordedReplay) -> FloatArray:
     """Penetration of the raw model's tool into the block at rest (f,) [m], 0 apart from it.
 
-    It is radius minus the signed distance of the tool's centre to the box; the base lies on the
-    table and is no way out. None if the phantom is no box.
+    It is radius minus the signed distance of the tool's centre to the free surface; what is held is
+    no way out.
     """
     rest = np.asarray(replay["rest"], dtype=float)
     low, high = rest.min(axis=0), rest.max(axis=0)
     apart = np.minimum(np.abs(rest - low), np.abs(rest - high)).min(axis=1)
+    centres = np.asarray(replay["tool_raw"], dtype=float)
     if apart.max() > FLAT:
-        return None
-    low[2] -= 1.0
-    beyond = np.abs(np.asarray(replay["tool_raw"]) - (low + high) / 2) - (high - low) / 2
-    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-    distance = outside + np.minimum(beyond.max(axis=1), 0.0)
+        distance = _beyond_surface(centres, rest, np.asarray(replay["faces"], dtype=np.int64))
+    else:
+        distance = _beyond_box(centres, low - np.array([0.0, 0.0, 1.0]), high)
     return np.asarray(np.maximum(float(replay["tool_radius_raw"]) - distance, 0.0))
+
+
+def _beyond_box(centres: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Signed distance (f,) [m] of places (f, 3) to a box, negative inside."""
+    beyond = np.abs(centres - (low + high) / 2) - (high - low) / 2
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0))
+
+
+def _beyond_surface(centres: FloatArray, vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Signed distance (f,) [m] of places (f, 3) to triangles, negative behind them."""
+    from palpate.setup.free_form.closest_point import nearest
+
+    corners = vertices[faces]
+    number, places = nearest(centres, corners)
+    a, b, c = corners[number].transpose(1, 0, 2)
+    behind = np.einsum("fi,fi->f", centres - places, np.cross(b - a, c - a)) < 0
+    distance = np.linalg.norm(centres - places, axis=1)
+    return np.where(behind, -distance, distance)
 
 
 def touching(depth: FloatArray) -> list[list[int]]:

@@ -8,10 +8,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from palpate.app.drawing import colours
 from palpate.app.drawing.figures import Figure, LinesFigure, SurfaceFigure, float32
+from palpate.app.drawing.free_surface import FreeSurface
 from palpate.app.drawing.surface_bands import IntArray, lattice
 from palpate.app.scene.model_layer import ModelLayer
 from palpate.app.scene.stiffness_surface import StiffnessSurface, stiffness_surface_of
@@ -25,8 +25,10 @@ CROSS, TOUCH = 2.5e-3, 7e-4
 """Size of a landmark's cross and radius of a touch's bead [m]."""
 TICK, TICKS_APART = 2.6e-3, 3.2e-3
 """Length and spacing of the hatching [m]."""
-BASE = 1e-3
-"""Vertices up to this height over the lowest belong to the base [m]."""
+RAISED = 2e-4
+"""Height of the hatching over the border, so that the table does not hide it [m]."""
+LEVEL = 0.2
+"""Least horizontal part of a normal along which the hatching is level [1]."""
 AHEAD = (196, 201, 208)
 """Colour of the tool's path after the current frame."""
 
@@ -92,34 +94,28 @@ class Annotations:
             "landmarks-touches": SurfaceFigure(float32(beads), turns, colours.TOOL),
         }
 
-    def base_figures(self, rest: FloatArray, extended: bool) -> dict[str, Figure]:
-        """Hatching around the fixed base.
+    def base_figures(self, body: FreeSurface, extended: bool) -> dict[str, Figure]:
+        """Hatching along the border of the free surface, beyond which the body is held.
 
         Args:
-            rest: (v, 3) vertices of the body at rest [m].
+            body: the free surface at rest.
             extended: whether the extended model is shown, whose base may be loose.
         """
-        low, high = rest.min(axis=0), rest.max(axis=0)
-        base = rest[rest[:, 2] < low[2] + BASE, :2].astype(float)
-        corners = base[ConvexHull(base).vertices]
-        edges = np.roll(corners, -1, axis=0) - corners
-        lengths = np.linalg.norm(edges, axis=1)
-        ends = np.cumsum(lengths)
-        ticks = []
-        for way in np.arange(0.5 * TICKS_APART, ends[-1], TICKS_APART):
-            edge = int(np.searchsorted(ends, way))
-            along = edges[edge] / lengths[edge]
-            at = corners[edge] + (way - ends[edge] + lengths[edge]) * along
-            if not (extended and self._is_loose(at, low, high)):
-                outwards = np.array([along[1], -along[0]])
-                ticks.append([at, at + TICK * (outwards - along) / np.sqrt(2)])
-        outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-        flat = np.concatenate([outline, np.array(ticks).reshape(-1, 2, 2)])
-        return {
-            "base": LinesFigure(
-                float32(np.dstack([flat, np.full(flat.shape[:2], 2e-4)])), colours.SUPPORT, 1.6
-            )
-        }
+        edges, normals = body.border
+        if not len(edges):
+            return {}
+        low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+        outline = body.vertices[edges] + np.array([0.0, 0.0, RAISED])
+        along, outwards = _beside(outline, normals)
+        ends = np.cumsum(np.linalg.norm(outline[:, 1] - outline[:, 0], axis=1))
+        ways = np.arange(0.5 * TICKS_APART, ends[-1], TICKS_APART)
+        edge = np.searchsorted(ends, ways)
+        at = outline[edge, 1] - (ends[edge] - ways)[:, None] * along[edge]
+        tips = at + TICK * (outwards[edge] - along[edge]) / np.sqrt(2)
+        held = [not (extended and self._is_loose(place, low, high)) for place in at]
+        ticks = np.stack([at, tips], axis=1)[held]
+        segments = float32(np.concatenate([outline, ticks]))
+        return {"base": LinesFigure(segments, colours.SUPPORT, 1.6)}
 
     def _is_loose(self, at: FloatArray, low: FloatArray, high: FloatArray) -> bool:
         for edge, extent in self.loose:
@@ -159,6 +155,19 @@ class Annotations:
                     float32(points), faces, colours.EXTENDED, share * opacity
                 )
         return figures
+
+
+def _beside(edges: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (e, 3) along edges (e, 2, 3) [m], and across them, away from the body: level
+    unless the surface with these normals (e, 3) lies flat there.
+    """
+    along = edges[:, 1] - edges[:, 0]
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    level = normals * np.array([1.0, 1.0, 0.0])
+    steep = np.linalg.norm(level, axis=1, keepdims=True) > LEVEL
+    across = np.where(steep, level, normals)
+    across = across - np.einsum("ei,ei->e", across, along)[:, None] * along
+    return along, across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
 
 
 def annotations_of(run: Run) -> Annotations:

@@ -169,8 +169,9 @@ class ManualRegistration:
         if shown.over:
             return pose
         low, high = middle_of(pose.apply(phantom.cloud), 0.8 * max(phantom.geometry.size))
-        right = float(phantom.geometry.high[0])
-        aside = np.array([right + APART - low[0], -(low[1] + high[1]) / 2, 0.0])
+        body = phantom.geometry
+        level = (body.low[1] + body.high[1] - low[1] - high[1]) / 2
+        aside = np.array([body.high[0] + APART - low[0], level, 0.0])
         return Transform(np.eye(3), aside) @ pose
 
     def _picture(self, phantom: Phantom, shown: RegistrationView) -> PairPicture:
@@ -188,11 +189,16 @@ class ManualRegistration:
                     marks.append(Mark(number, side, ends[side], shown.chosen == (number, side)))
             if len(ends) == 2:
                 lines.append((ends["cloud"], ends["mesh"], number))
-        names, top = tuple(phantom.landmarks), np.array([0.0, 0.0, phantom.geometry.height])
+        names, (bottom, high) = (
+            tuple(phantom.landmarks),
+            (phantom.geometry.low, phantom.geometry.high),
+        )
+        top = np.array([*(bottom + high)[:2] / 2, high[2]])
         return PairPicture(
             cloud=pose.apply(phantom.cloud),
             vertices=phantom.vertices,
             faces=phantom.faces,
+            edges=phantom.edges,
             landmarks=np.array([phantom.landmarks[name] for name in names]).reshape(-1, 3),
             names=names,
             marks=tuple(marks),

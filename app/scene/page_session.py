@@ -181,10 +181,9 @@ class Session:
     def _look(self, where: Direction = "reset") -> None:
         if self.view is None or self.picture is None:
             return
-        replay = self._renderer_of(self.view.run, self.view.sequence).replay
-        viewpoint = viewpoint_for(
-            replay.size, replay.camera("raw").translation, self.picture.columns, where
-        )
+        renderer = self._renderer_of(self.view.run, self.view.sequence)
+        eye = renderer.replay.camera("raw").translation
+        viewpoint = viewpoint_for(*renderer.corners, eye, self.picture.columns, where)
         if self._viewpoint is not None and self._viewpoint[0] == self.view.run:
             viewpoint = self._viewpoint[1]
         for scene in self._scenes:

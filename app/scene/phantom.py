@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 from weakref import WeakValueDictionary
 
 import numpy as np
 
+from palpate.app.drawing.free_surface import creases
 from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.registration_store import refuse_unregistrable
 from palpate.dataset.accepted_registration import rest_digest
@@ -26,6 +28,8 @@ __all__ = ["Phantom", "Phantoms"]
 MOST_DRAWN = 500_000
 """Points of a rest cloud that a page draws and picks from: of a larger cloud every second, every
 third and so on. ICP uses all points."""
+SHARP = np.radians(40.0)
+"""Triangles that meet at a larger angle than this have an edge between them [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,11 @@ class Phantom:
     def faces(self) -> IndexArray:
         """(t, 3) triangles with outward normals."""
         return self.geometry.closed_surface[1].astype(np.int64)
+
+    @cached_property
+    def edges(self) -> FloatArray:
+        """Ends (e, 2, 3) of the surface's sharp edges [m]."""
+        return creases(self.vertices, self.faces, SHARP)
 
     def start(self, kind: str) -> Transform:
         """phantom_from_camera for drawing the cloud before any pair is clicked."""

@@ -59,6 +59,7 @@ class PairPicture:
         cloud: (n, 3).
         vertices: of the phantom.
         faces: of the phantom.
+        edges: ends (e, 2, 3) of its sharp edges.
         landmarks: (k, 3).
         names: of the landmarks.
         marks: ends of the existing pairs.
@@ -70,6 +71,7 @@ class PairPicture:
     cloud: FloatArray
     vertices: FloatArray
     faces: IndexArray
+    edges: FloatArray
     landmarks: FloatArray
     names: tuple[str, ...]
     marks: tuple[Mark, ...] = ()

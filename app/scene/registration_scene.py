@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from palpate.app.drawing import colours
 from palpate.app.scene.registration_picture import Arrow, Mark, PairPicture, pair_colour
@@ -21,8 +22,14 @@ if TYPE_CHECKING:
 
 __all__ = ["PairScene", "Ray", "ViserPairScene"]
 
-POINT_SIZE = 0.0007
-"""Size of a point of the cloud [m]."""
+POINT_SIZES = (0.0003, 0.0007)
+"""Least and largest size of a point of the cloud [m]."""
+GAPLESS = 0.6
+"""Size of a point over the typical distance of neighbours, at which their relief shows [1]."""
+SAMPLED = 500
+"""Points by which that distance is measured."""
+SHADES = (0.35, 1.25)
+"""Brightness of the lowest and of the highest points [1]."""
 BALL, CHOSEN = 0.0011, 0.0016
 """Radius of a mark, and of the selected one [m]."""
 BLOCK, EDGE, LANDMARK, WEAK = (176, 184, 196), (96, 106, 120), (110, 120, 134), (205, 60, 60)
@@ -87,7 +94,8 @@ class ViserPairScene:
         """Name, digest and maker of every node."""
         yield "/cloud", (_key(picture.cloud), partial(self._cloud, picture.cloud))
         yield "/block", (_key(picture.vertices), partial(self._block, picture))
-        yield "/edges", (_key(picture.vertices), partial(self._edges, picture.vertices))
+        if len(picture.edges):
+            yield "/edges", (_key(picture.edges), partial(self._edges, picture.edges))
         for label, place in zip(picture.names, picture.landmarks, strict=True):
             yield f"/landmarks/{label}", (_key(place), partial(self._landmark, label, place))
         for mark in picture.marks:
@@ -139,8 +147,8 @@ class ViserPairScene:
         return self._client.scene.add_point_cloud(
             "/cloud",
             points.astype(np.float32),
-            colours.MEASURED,
-            point_size=POINT_SIZE,
+            by_height(points[:, 2]),
+            point_size=size_of_points(points),
             point_shape="circle",
             precision="float32",
             point_shading="flat",
@@ -157,10 +165,9 @@ class ViserPairScene:
             receive_shadow=False,
         )
 
-    def _edges(self, vertices: FloatArray) -> Any:
-        edges = vertices.astype(np.float32)[np.array(_box_edges(vertices))]
+    def _edges(self, edges: FloatArray) -> Any:
         return self._client.scene.add_line_segments(
-            "/edges", edges, EDGE, thickness=1.4, thickness_units="screen"
+            "/edges", edges.astype(np.float32), EDGE, thickness=1.4, thickness_units="screen"
         )
 
     def _landmark(self, name: str, place: FloatArray) -> Any:
@@ -238,6 +245,25 @@ class ViserPairScene:
         return root
 
 
+def by_height(heights: FloatArray) -> Any:
+    """Colours (n, 3) of points by their heights (n,) [m], the lowest dark: on a smooth body nothing
+    else shows in which place a point lies.
+    """
+    low, high = np.percentile(heights, [2, 98]) if len(heights) else (0.0, 1.0)
+    share = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)[:, None]
+    bright = SHADES[0] + share * (SHADES[1] - SHADES[0])
+    return np.clip(bright * np.array(colours.MEASURED), 0, 255).astype(np.uint8)
+
+
+def size_of_points(points: FloatArray) -> float:
+    """Size [m] at which points (n, 3) [m] are drawn: the smaller, the denser they are."""
+    sample = points[:: 1 + len(points) // SAMPLED]
+    if len(points) < 2:
+        return POINT_SIZES[1]
+    apart = cKDTree(points).query(sample, k=2)[0][:, 1]
+    return float(np.clip(GAPLESS * np.median(apart), *POINT_SIZES))
+
+
 def _key(array: Any) -> str:
     return str(hash(np.ascontiguousarray(array, dtype=np.float32).tobytes()))
 
@@ -252,9 +278,3 @@ def _ring(centre: FloatArray, axis: FloatArray) -> FloatArray:
     radius = 0.45 * float(np.linalg.norm(axis))
     circle = centre + radius * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other)
     return np.stack([circle[:-1], circle[1:]], axis=1).astype(np.float32)
-
-
-def _box_edges(corners: FloatArray) -> list[tuple[int, int]]:
-    """Pairs of the eight corners of a box that differ along one axis only."""
-    same = np.abs(corners[:, None] - corners[None]) < 1e-9
-    return [(i, j) for i in range(len(corners)) for j in range(i) if same[i, j].sum() == 2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from palpate.app.drawing.figures import (
     ToolFigure,
     float32,
 )
+from palpate.app.drawing.free_surface import FreeSurface
 from palpate.app.drawing.surface_bands import FineSurface, IntArray, grid_edges, refine
 from palpate.app.drawing.view import Model, Quantity, Section, View
 from palpate.app.scene.annotations import Annotations, path_lines
@@ -35,13 +36,25 @@ __all__ = ["SequenceRenderer"]
 
 NAMES = {"raw": "Raw model", "extended": "Extended model", "corrected": "Corrected model"}
 MARGIN, APART = 0.008, 0.016
-"""Margin around the block within which points are drawn, and gap between models [m]."""
+"""Margin around the body within which points are drawn, and gap between models [m]."""
 MOST_POINTS = 50_000
 """Points of a cloud that a browser draws."""
 MOST_TRIANGLES = 25_000
 """Approximate number of triangles of a coloured surface."""
 WIRE = 1.2
 """Width of grid lines [pixel]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """The body at rest cut by a section: its surfaces by their parts, its edges, and the cut face
+    as places (n, 3) [m] and triangles; None where the plane misses the body.
+    """
+
+    section: Section
+    surfaces: dict[int, FineSurface]
+    edges: IntArray
+    face: tuple[FloatArray, IntArray] | None
 
 
 class SequenceRenderer:
@@ -67,14 +80,15 @@ class SequenceRenderer:
             parts: refine(self._rest, replay["faces"], parts)
             for parts in (1, _parts(len(replay["faces"])))
         }
+        self.body = FreeSurface.of(self._rest, replay["faces"])
         self._edges = grid_edges(self._rest, replay["faces"])
-        self._cut: tuple[Section, dict[int, FineSurface], IntArray] | None = None
+        self._cut: _Cut | None = None
         self._points = 0
         self._ends: dict[Quantity, float | None] = {}
 
     @cached_property
     def corners(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corner of the block at rest (3,) [m]."""
+        """Lowest and highest corner of the body at rest (3,) [m]."""
         low, high = self._rest.min(axis=0), self._rest.max(axis=0)
         return np.array([low[0], low[1], 0.0]), high
 
@@ -135,14 +149,19 @@ class SequenceRenderer:
                 )
                 drawn = {**drawn, **around}
             if alone:
-                drawn[f"name-{model}"] = LabelFigure(
-                    NAMES[model], np.array([0.0, 0.0, self.corners[1][2] + 0.03])
-                )
+                drawn[f"name-{model}"] = LabelFigure(NAMES[model], self._over_middle(0.03))
             figures.update({name: replace(figure, at=at) for name, figure in drawn.items()})
         if not models:
             figures, points = self._around(view, self.layers["raw"], "")
         quantity, limit = (view.quantity, limit) if coloured else (None, None)
         return Picture(view.frame, figures, points, quantity, limit, columns)
+
+    def _over_middle(self, height: float) -> FloatArray:
+        """Place (3,) [m] so far above the highest point of the body, over the middle of its
+        bounds.
+        """
+        low, high = self.corners
+        return np.array([*(low + high)[:2] / 2, high[2] + height])
 
     def _columns(
         self, view: View, models: tuple[Model, ...]
@@ -153,9 +172,11 @@ class SequenceRenderer:
         if not view.side_by_side or len(models) < 2:
             return ((0.0, 0.0, 0.0),) * max(1, len(models))
         eye = self.layers["raw"].camera(-1).translation
-        around = np.arctan2(eye[1], eye[0])
+        low, high = self.corners
+        away = eye - (low + high) / 2
+        around = np.arctan2(away[1], away[0])
         right = np.array([-np.sin(around), np.cos(around)])
-        size = self.corners[1] - self.corners[0]
+        size = high - low
         apart = float(np.abs(right) @ size[:2]) + APART
         places = [apart * (len(models) - 1 - number) * right for number in range(len(models))]
         return tuple((float(x), float(y), 0.0) for x, y in places)
@@ -219,7 +240,7 @@ class SequenceRenderer:
         if "landmarks" in view.layers:
             figures.update(self._annotations.landmark_figures())
         if "base" in view.layers:
-            figures.update(self._annotations.base_figures(self._rest, layer.model != "raw"))
+            figures.update(self._annotations.base_figures(self.body, layer.model != "raw"))
         if "lump" in view.layers and not (suffix and layer.model == "raw"):
             figures.update(self._annotations.lump_figures(layer, view.frame, view.opacity("lump")))
             if (skin := self._annotations.stiffness) is not None:
@@ -230,15 +251,15 @@ class SequenceRenderer:
 
     def _surface(self, section: Section | None, *, fine: bool) -> FineSurface:
         parts = (max if fine else min)(self._surfaces)
-        return self._surfaces[parts] if section is None else self._cut_by(section)[1][parts]
+        return self._surfaces[parts] if section is None else self._cut_by(section).surfaces[parts]
 
     def _edges_left(self, section: Section | None) -> IntArray:
-        return self._edges if section is None else self._cut_by(section)[2]
+        return self._edges if section is None else self._cut_by(section).edges
 
-    def _cut_by(self, section: Section) -> tuple[Section, dict[int, FineSurface], IntArray]:
-        """The remaining surfaces and edges of a section; the last result is cached."""
+    def _cut_by(self, section: Section) -> _Cut:
+        """The rest that a section leaves; the last result is cached."""
         cut = self._cut
-        if cut is None or cut[0] != section:
+        if cut is None or cut.section != section:
             surfaces = {
                 parts: clipped(surface, self._rest, section)
                 for parts, surface in self._surfaces.items()
@@ -246,7 +267,8 @@ class SequenceRenderer:
             edges = self._edges[
                 np.all(depth_inside(section, self._rest)[self._edges] >= -1e-9, axis=1)
             ]
-            self._cut = cut = (section, surfaces, edges)
+            face = cut_face(*self.body.closed, section)
+            self._cut = cut = _Cut(section, surfaces, edges, face)
         return cut
 
     def _cap(self, view: View, layer: ModelLayer) -> tuple[FloatArray, FloatArray, IntArray] | None:
@@ -255,7 +277,7 @@ class SequenceRenderer:
         """
         if view.section is None:
             return None
-        face = cut_face(*self.corners, view.section)
+        face = self._cut_by(view.section).face
         moved = None if face is None else layer.moved(view.frame, face[0])
         return None if face is None or moved is None else (face[0], moved, face[1])
 
@@ -266,7 +288,7 @@ class SequenceRenderer:
             self._clouds(int(self.replay["cloud_index"][view.frame]))
         )
         if view.crop:
-            points = points[_near_box(points, self.corners[1] - self.corners[0])]
+            points = points[_near_box(points, *self.corners)]
         if view.section is not None:
             points = points[depth_inside(view.section, points) >= 0]
         count = min(MOST_POINTS, int(np.ceil(len(points) * view.opacity("measured"))))
@@ -290,8 +312,8 @@ def _parts(faces: int) -> int:
     return int(np.clip(np.sqrt(MOST_TRIANGLES / faces), 1, 10))
 
 
-def _near_box(points: FloatArray, size: FloatArray) -> Any:
-    """Mask of the points within the box or near it, and above the table."""
-    low = np.array([-size[0] / 2, -size[1] / 2, 0.0]) - MARGIN * np.array([1.0, 1.0, -0.1])
-    high = np.array([size[0] / 2, size[1] / 2, size[2]]) + MARGIN
-    return np.all((points > low) & (points < high), axis=1)
+def _near_box(points: FloatArray, low: FloatArray, high: FloatArray) -> Any:
+    """Mask of the points within the body's bounds or near them, and above the table."""
+    return np.all(
+        (points > low - MARGIN * np.array([1.0, 1.0, -0.1])) & (points < high + MARGIN), axis=1
+    )

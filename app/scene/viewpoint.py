@@ -31,7 +31,8 @@ class Viewpoint:
 
 
 def viewpoint_for(
-    size: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
     eye: FloatArray,
     columns: Sequence[tuple[float, float, float]],
     where: Direction,
@@ -39,13 +40,15 @@ def viewpoint_for(
     """A viewpoint from which the phantom is visible, or all its copies.
 
     Args:
-        size: edge lengths of the phantom (3,) [m].
+        low: lowest corner of the phantom's bounds (3,) [m].
+        high: highest corner (3,) [m].
         eye: position of the depth camera (3,) [m].
         columns: offset of each copy [m].
         where: `reset` is the depth camera's side, raised; at the `top` x is to the right; the
             `front` is seen along +y, the `side` along -x.
     """
-    around = np.arctan2(eye[1], eye[0])
+    size, middle = high - low, (low + high) / 2
+    around = np.arctan2(eye[1] - middle[1], eye[0] - middle[0])
     directions = {
         "reset": (np.cos(RAISED) * np.cos(around), np.cos(RAISED) * np.sin(around), np.sin(RAISED)),
         # Slightly inclined: the upward direction of a vertical view is undefined.
@@ -54,7 +57,7 @@ def viewpoint_for(
         "side": (1.0, 0.0, 0.0),
     }
     shifts = np.array(columns)
-    centre = shifts.mean(axis=0) + np.array([0.0, 0.0, 0.52 * size[2]])
+    centre = shifts.mean(axis=0) + middle + np.array([0.0, 0.0, 0.02 * size[2]])
     reach = float(np.linalg.norm(size) + np.ptp(shifts, axis=0).max()) / 2
     away = np.array(directions[where]) * reach / np.sin(FIELD_OF_VIEW / 2) * ROOM
     return Viewpoint(centre + away, centre, np.array([0.0, 0.0, 1.0]))

@@ -32,6 +32,7 @@ from palpate.diagnosis.observation.observe_splits import (
 )
 from palpate.diagnosis.report.error_clues import error_clues
 from palpate.diagnosis.report.error_patterns import draw_patterns, error_patterns
+from palpate.diagnosis.report.file_frame import with_places_in_file
 from palpate.diagnosis.report.force_report import with_palpation
 from palpate.diagnosis.report.palpation_figure import draw_palpation
 from palpate.diagnosis.report.report import report_of, verdict_of
@@ -190,7 +191,7 @@ def _run(
     result = _with_stiffness_map(result, evaluator, fitted, findings, pictures, options.seed)
     if options.assurance:
         result = with_supplements(result, evaluator, fitted, findings)
-    result = _with_pictures(result, evaluator, fitted, findings, making)
+    result = with_places_in_file(_with_pictures(result, evaluator, fitted, findings, making))
     for number, task in enumerate(recordings):
         part(report, 0.8, 1.0)(number / len(recordings), "replaying every sequence for the page")
         task.result()

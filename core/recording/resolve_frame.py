@@ -76,16 +76,12 @@ class FrameResolver:
     def __init__(
         self, folder: Path, sequence: str, clouds: Sequence[int], extended: dict[str, Any]
     ) -> None:
-        registered = extended.get("registration")
-        dataset = open_dataset(folder).registered(
-            AcceptedRegistration.from_json(registered) if registered else None
-        )
-        if not len(dataset.sequence(sequence)):
+        self._experiment = _experiment(folder, json.dumps(extended.get("registration")))
+        if not len(self._experiment.dataset.sequence(sequence)):
             raise RunError(
                 f"{sequence} has no clouds, so that there is nothing to compare with",
                 sequence=sequence,
             )
-        self._experiment = Experiment.of(dataset)
         self.stated = self._experiment.stated
         self.tuned = with_fitted_values(self.stated, extended)
         self._recorded_radius = setup_of_model(self.stated, extended).tool.radius
@@ -173,6 +169,16 @@ class FrameResolver:
             )
             self._cleaned[frame, radius] = observed.clouds[0]
         return self._cleaned[frame, radius]
+
+
+@lru_cache(maxsize=2)
+def _experiment(folder: Path, registered: str) -> Experiment:
+    """The experiment of a dataset with a registration (JSON, or null for an automatic one), cached
+    for its other sequences: to register a free form takes some ten seconds.
+    """
+    stored = json.loads(registered)
+    accepted = AcceptedRegistration.from_json(stored) if stored else None
+    return Experiment.of(open_dataset(folder).registered(accepted))
 
 
 @lru_cache(maxsize=4)

@@ -33,6 +33,17 @@ const axes = (viewer) => {
 export const fromViewer = (viewer, vector) => axes(viewer).map((axis) => dot(axis, vector));
 
 /**
+ * Return the place of the viewer's camera in the phantom frame [m]; null before the scene has
+ * loaded.
+ * @param {ViewerWindow} viewer
+ * @returns {number[] | null}
+ */
+export const eyeOf = (viewer) => {
+  const place = viewer.__viserMutable?.camera.position;
+  return place ? fromViewer(viewer, [place.x, place.y, place.z]) : null;
+};
+
+/**
  * @param {ViewerWindow} viewer
  * @param {number[]} vector
  * @returns {number[]}

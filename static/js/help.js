@@ -17,7 +17,7 @@ const PAGE = [
   ["L", "loop on or off"],
   ["0 1 2 3", "look from the side of the camera, the top, the front, the side"],
   ["B", "models side by side"],
-  ["X", "cut the block open"],
+  ["X", "cut the phantom open"],
   ["Ctrl Z", "undo, in What if and in Register"],
   ["Tab, Enter", "reach and press every control"],
 ];

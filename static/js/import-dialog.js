@@ -62,7 +62,7 @@ function draw(dialog, file) {
   });
   const folder = element("input", {
     name: "folder",
-    placeholder: "/data/bench/block-07",
+    placeholder: "/data/bench/phantom-07",
     autocomplete: "off",
     "aria-label": "Folder on the server",
   });

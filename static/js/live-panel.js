@@ -4,11 +4,13 @@ import { get, remove, toError } from "./api.js";
 import { byId, element, fill } from "./dom.js";
 import { projectPointer, hitsTool } from "./drag.js";
 import { capitalise, formatMm } from "./format.js";
+import { nearestSpot, reliefPicture, surfacePaths } from "./height-map.js";
 import { addPanel, openedPanel } from "./panels.js";
 import { onViewerLoad, pageId, refreshScene } from "./scene.js";
 import { subscribe, set, state } from "./store.js";
 
-/** @import { EffectValues, LiveAnswer, Point, ViewerWindow, WhatIfRow } from "./types.js" */
+/** @import { EffectValues, HeightMap, LiveAnswer, Point } from "./types.js" */
+/** @import { ViewerWindow, WhatIfRow } from "./types.js" */
 
 /** @type {Record<string, string>} */
 const MODELS = { raw: "Raw model", extended: "Extended model", whatif: "As set under What if" };
@@ -120,22 +122,63 @@ async function leave() {
 const mutedText = (text) => element("p", { class: "muted" }, text);
 
 /**
- * Return the lowest and the highest corner of the block.
+ * Return the lowest and the highest corner of the body.
  * @returns {[Point, Point]}
  */
-const blockCorners = () =>
+const bodyCorners = () =>
   state().series?.box ?? [
     [-0.04, -0.02, 0],
     [0.04, 0.02, 0.04],
   ];
 
 /**
- * Return a place of the tool above the block's middle.
+ * Return the heights of the body's free surface; those of a flat block where they are unknown.
+ * @returns {HeightMap}
+ */
+const surfaceMap = () => {
+  const [low, high] = bodyCorners();
+  const spacing = high[0] - low[0];
+  return (
+    state().series?.height_map ?? {
+      corner: [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2],
+      spacing,
+      heights: [[high[2]]],
+    }
+  );
+};
+
+/**
+ * Return the place of the surface under the tool, or nearest to it.
+ * @param {Point} place
+ */
+const underTool = ([x, y]) => nearestSpot(surfaceMap(), x, y);
+
+/**
+ * Return how far the tip of the tool is below the surface under it [m].
+ * @param {Point} place
+ * @returns {number}
+ */
+const depthBelow = (place) => underTool(place).z + radius - place[2];
+
+/**
+ * Return the place of the tool over the surface nearest to x, y, with its tip so far below it [m].
+ * @param {number} x
+ * @param {number} y
+ * @param {number} below
+ * @returns {Point}
+ */
+const overSurface = (x, y, below) => {
+  const spot = nearestSpot(surfaceMap(), x, y);
+  return [spot.x, spot.y, spot.z + radius - below];
+};
+
+/**
+ * Return a place of the tool above the middle of the body.
  * @returns {Point}
  */
 const aboveMiddle = () => {
-  const [low, high] = blockCorners();
-  return [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 2 * radius];
+  const [low, high] = bodyCorners();
+  return overSurface((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, -radius);
 };
 
 /** Open the socket, and again if it closes while the panel is in front. */
@@ -297,7 +340,7 @@ const minus = (a, b) => a.map((value, i) => value - b[i]);
 /** Draw the panel. */
 function draw() {
   const lift = () => {
-    const [, high] = blockCorners();
+    const [, high] = bodyCorners();
     moveTool([toolCentre[0], toolCentre[1], high[2] + 2 * radius]);
   };
   fill(
@@ -355,11 +398,13 @@ function draw() {
 let toPad = () => [0, 0];
 
 /**
- * Create the pad: the block from above, on which the pointer or arrow keys move the tool.
+ * Create the pad: the body's free surface from above, over which the pointer or the arrow keys move
+ * the tool; its depth below the surface stays. Beside the surface it goes to the nearest place.
  * @returns {SVGSVGElement}
  */
 function toolPad() {
-  const [low, high] = blockCorners();
+  const [low, high] = bodyCorners();
+  const map = surfaceMap();
   const room = 2 * radius;
   const scale = PAD / (high[0] - low[0] + 2 * room);
   const tall = Math.round((high[1] - low[1] + 2 * room) * scale);
@@ -373,17 +418,24 @@ function toolPad() {
     "aria-label": "Tool from above; arrow keys move it by 1 mm",
     tabindex: 0,
   }).forEach(([key, value]) => node.setAttribute(key, String(value)));
-  const [width, height] = [high[0] - low[0], high[1] - low[1]].map((edge) => edge * scale);
-  const [left, size] = [room * scale, `width="${width}" height="${height}"`];
-  node.innerHTML = `<rect x="${left}" y="${left}" ${size} rx="3"/><circle r="${radius * scale}"/>`;
   toPad = ([x, y]) => [(x - low[0] + room) * scale, (high[1] + room - y) * scale];
+  const { outline, cells } = surfacePaths(map, (x, y) => toPad([x, y]));
+  const [columns, rows] = [map.heights[0].length, map.heights.length];
+  const [left, top] = toPad([
+    map.corner[0] - map.spacing / 2,
+    map.corner[1] + (rows - 0.5) * map.spacing,
+  ]);
+  const size = `width="${columns * map.spacing * scale}" height="${rows * map.spacing * scale}"`;
+  node.innerHTML =
+    `<path class="body" d="${cells}"/>` +
+    `<image x="${left}" y="${top}" ${size} preserveAspectRatio="none"/>` +
+    `<path class="outline" d="${outline}"/><circle r="${radius * scale}"/>`;
+  node.querySelector("image")?.setAttribute("href", reliefPicture(map));
+  /** @param {number} x @param {number} y */
+  const moveOver = (x, y) => moveTool(overSurface(x, y, depthBelow(toolCentre)));
   /** @param {PointerEvent} event */
   const move = (event) =>
-    moveTool([
-      event.offsetX / scale + low[0] - room,
-      high[1] + room - event.offsetY / scale,
-      toolCentre[2],
-    ]);
+    moveOver(event.offsetX / scale + low[0] - room, high[1] + room - event.offsetY / scale);
   node.addEventListener("pointerdown", (event) => {
     node.setPointerCapture(event.pointerId);
     move(event);
@@ -398,31 +450,31 @@ function toolPad() {
     if (!step) return;
     event.preventDefault();
     event.stopPropagation();
-    moveTool([toolCentre[0] + 1e-3 * step[0], toolCentre[1] + 1e-3 * step[1], toolCentre[2]]);
+    moveOver(toolCentre[0] + 1e-3 * step[0], toolCentre[1] + 1e-3 * step[1]);
   });
   return node;
 }
 
 /**
- * Create the slider for the depth of the tool's tip below the block's top [mm].
+ * Create the slider for the depth of the tool's tip below the surface under it [mm].
  * @returns {HTMLElement}
  */
 function depthSlider() {
-  const [low, high] = blockCorners();
+  const [low, high] = bodyCorners();
   const most = 0.25 * Math.min(...high.map((value, i) => value - low[i])) * 1e3;
   return element(
     "label",
     { class: "live-depth" },
-    "Below the top",
+    "Below the surface",
     element("input", {
       type: "range",
       id: "live-depth",
       min: -10,
       max: most.toFixed(1),
       step: 0.1,
-      "aria-label": "Tool below the top in mm",
+      "aria-label": "Tool below the surface in mm",
       oninput: (event) =>
-        moveTool([toolCentre[0], toolCentre[1], high[2] + radius - +event.target.value / 1e3]),
+        moveTool(overSurface(toolCentre[0], toolCentre[1], +event.target.value / 1e3)),
     }),
     element("output", { id: "live-below" }),
   );
@@ -436,7 +488,7 @@ function drawPad() {
   const circle = node.querySelector("circle");
   circle?.setAttribute("cx", String(x));
   circle?.setAttribute("cy", String(y));
-  const below = (blockCorners()[1][2] + radius - toolCentre[2]) * 1e3;
+  const below = depthBelow(toolCentre) * 1e3;
   const bar = byId("live-depth", HTMLInputElement);
   if (document.activeElement !== bar) bar.value = String(below);
   byId("live-below").textContent = `${below.toFixed(1)} mm`;

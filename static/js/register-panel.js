@@ -170,7 +170,7 @@ function pairsPart(editor, view, actions) {
         : element(
             "p",
             { class: "empty" },
-            "None yet. Corners and edges tell most; three pairs that are far apart are enough.",
+            "None yet. Corners, edges and tips tell most; three pairs far apart are enough.",
           ),
     ),
     (view.fit?.warnings ?? []).map((text) => element("div", { class: "note-card" }, text)),

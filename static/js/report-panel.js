@@ -243,7 +243,7 @@ const section = (title, aside, ...children) =>
  * @param {Cause} cause
  * @returns {HTMLElement}
  */
-function causeCard({ effect, probability, parameters }) {
+function causeCard({ effect, probability, parameters, in_file_frame: inFile }) {
   const rows = Object.entries(parameters ?? {}).map(([name, entry]) => {
     const shown = formatParameter(entry);
     return element(
@@ -271,7 +271,19 @@ function causeCard({ effect, probability, parameters }) {
         : null,
     ),
     element("table", {}, element("tbody", {}, rows)),
+    inFile ? element("small", {}, placeInFile(inFile)) : null,
   );
+}
+
+/**
+ * Say where a cause lies in the frame of the dataset's files.
+ * @param {NonNullable<Cause["in_file_frame"]>} places
+ * @returns {string}
+ */
+function placeInFile({ centre, polyline }) {
+  const ends = centre ? [centre] : polyline?.length ? [polyline[0], polyline.at(-1) ?? []] : [];
+  const shown = ends.map((at) => `(${at.map((value) => (value * 1e3).toFixed(1)).join(", ")})`);
+  return `In the frame of the surface's file: ${shown.join(" to ")} mm`;
 }
 
 /**

@@ -92,6 +92,15 @@ export interface Series {
   lumps: number | boolean;
   landmarks: number | boolean;
   box: [Point, Point];
+  /** Heights [m] of the free surface from above; rows along y, null where there is none. */
+  height_map: HeightMap;
+}
+
+/** `corner` is the middle of the first cell, `spacing` a cell's edge length [m]. */
+export interface HeightMap {
+  corner: [number, number];
+  spacing: number;
+  heights: (number | null)[][];
 }
 
 export interface ViewRequest {
@@ -157,6 +166,8 @@ export interface Cause {
   parameters?: Record<string, Estimate>;
   cover?: Estimate;
   depth?: Estimate;
+  /** Places [m] in the frame of the dataset's files, of a phantom that was turned upright. */
+  in_file_frame?: { centre?: Point; polyline?: Point[] };
 }
 
 export interface Share {

@@ -2,11 +2,12 @@
 import { post, toast } from "./api.js";
 import { forgetCamera } from "./camera.js";
 import { byId, element, fill, icon } from "./dom.js";
+import { eyeOf } from "./drag.js";
 import { bindShortcuts } from "./shortcuts.js";
 import { inDrawOrder } from "./layer-styles.js";
 import { subscribe, set, state } from "./store.js";
 
-/** @import { Axis, Section } from "./types.js" */
+/** @import { Axis, Section, ViewerWindow } from "./types.js" */
 
 /** Name of the view, its icon, and the button's title. */
 const VIEWS = [
@@ -32,7 +33,7 @@ export function start(page) {
   for (const [where, shape, title] of VIEWS)
     initToolButton(`${where}-view`, shape, title, () => look(where));
   initToolButton("aside", "columns", "Models side by side (B)", toggleSideBySide);
-  initToolButton("section", "section", "Cut the block open (X)", toggleSection);
+  initToolButton("section", "section", "Cut the phantom open (X)", toggleSection);
   initToolButton(
     "crop",
     "cloud",
@@ -90,7 +91,7 @@ function toggleSection() {
   /** @type {Section} */
   const next = section
     ? { ...section, on: !section.on }
-    : { on: true, axis: "y", at: middleOf("y"), flip: false };
+    : { on: true, axis: "y", at: middleOf("y"), flip: hidesCut("y") };
   set({
     section: next,
     layers: next.on && series.lumps ? inDrawOrder([...state().layers, "lump"]) : state().layers,
@@ -109,6 +110,19 @@ const middleOf = (axis) => {
   ];
   const at = AXES.indexOf(axis);
   return (low[at] + high[at]) / 2;
+};
+
+/**
+ * Tell whether the part below the middle of an axis would stand between the eye and the cut.
+ * @param {Axis} axis
+ * @returns {boolean}
+ */
+const hidesCut = (axis) => {
+  const viewer = /** @type {ViewerWindow | null} */ (
+    byId("viewer", HTMLIFrameElement).contentWindow
+  );
+  const eye = viewer && eyeOf(viewer);
+  return Boolean(eye && eye[AXES.indexOf(axis)] < middleOf(axis));
 };
 
 /** Draw the bar of the section, unless its slider is being dragged. */
@@ -150,7 +164,8 @@ function drawSection() {
             role: "radio",
             "aria-checked": String(axis === section.axis),
             "data-axis": axis,
-            onclick: () => set({ section: { ...section, axis, at: middleOf(axis) } }),
+            onclick: () =>
+              set({ section: { ...section, axis, at: middleOf(axis), flip: hidesCut(axis) } }),
           },
           axis,
         ),

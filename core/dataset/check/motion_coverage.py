@@ -73,7 +73,7 @@ def _of_measurements(observed: bool, forces: bool) -> Iterable[CoverageGap]:
     if not forces:
         yield CoverageGap(
             ("young_modulus",),
-            "no forces: the stiffness of a homogeneous block does not show; add forces.csv",
+            "no forces: the stiffness of a homogeneous phantom does not show; add forces.csv",
         )
 
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shapes import cut_ball, dome
 
 from palpate.app.drawing.cut_section import clipped, cut_face, depth_inside
+from palpate.app.drawing.free_surface import FreeSurface
 from palpate.app.drawing.surface_bands import FineSurface, refine
 from palpate.app.drawing.view import Section
 from palpate.foundation.arrays import FloatArray
 from palpate.mesh.box_mesh import GridSpec, box_mesh
+from palpate.setup.phantom_geometry import Geometry
+from palpate.setup.setup import Box
 
 SIZE = (0.06, 0.04, 0.03)
 PLANES = [("x", 0.0113), ("y", -0.007), ("z", 0.021), ("z", 0.0)]
@@ -55,9 +59,28 @@ def test_new_points_move_with_the_material_and_keep_the_outward_turn():
 
 
 def test_cut_face_fills_the_opening_and_is_missing_beside_the_block():
-    low, high = np.array([-0.03, -0.02, 0.0]), np.array([0.03, 0.02, 0.03])
-    found = cut_face(low, high, Section(axis="y", at=0.005))
+    closed = closed_of(Box(size=SIZE))
+    found = cut_face(*closed, Section(axis="y", at=0.005))
     assert found is not None
     assert np.all(found[0][:, 1] == 0.005)
     assert area(*found) == pytest.approx(0.06 * 0.03)
-    assert cut_face(low, high, Section(axis="y", at=0.025)) is None
+    assert cut_face(*closed, Section(axis="y", at=0.025)) is None
+
+
+@pytest.mark.parametrize("body", [dome((0.04, 0.03, 0.025)), cut_ball(0.03, 0.02)])
+@pytest.mark.parametrize("axis", "xyz")
+def test_cut_faces_of_a_free_form_have_its_volume_and_none_of_them_leaves_it(body, axis):
+    low, high = (float(end["xyz".index(axis)]) for end in (body.low, body.high))
+    step = (high - low) / 30
+    volume = 0.0
+    for at in np.arange(low + step / 2, high, step):
+        found = cut_face(*closed_of(body), Section(axis=axis, at=float(at)))
+        assert found is not None
+        assert body.outside(found[0]).max() < 4e-4
+        volume += step * area(*found)
+    assert volume == pytest.approx(body.volume, rel=0.01)
+
+
+def closed_of(body: Geometry) -> tuple[FloatArray, np.ndarray]:
+    surface = body.surface()
+    return FreeSurface.of(surface.vertices, surface.faces).closed

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shapes import dome
 
 from palpate.app.reporting.timeline_series import (
     contact_force,
@@ -15,7 +16,6 @@ from palpate.app.reporting.timeline_series import (
 )
 from palpate.app.storage.run_store import RecordedReplay, Run
 from palpate.fem.newton import Outcome
-from palpate.foundation.arrays import FloatArray
 
 
 @pytest.fixture
@@ -32,15 +32,9 @@ def moved(replay: RecordedReplay, **arrays: Any) -> RecordedReplay:
     return RecordedReplay(replay.name, {**replay.arrays, **arrays})
 
 
-def depth_of(replay: RecordedReplay) -> FloatArray:
-    depth = push_depth(replay)
-    assert depth is not None
-    return depth
-
-
 def test_depth_from_above_is_how_far_the_ball_is_below_the_top(replay: RecordedReplay) -> None:
     np.testing.assert_allclose(
-        depth_of(replay), 0.003 * np.sin(np.pi * np.linspace(0.1, 0.9, 5)), atol=1e-8
+        push_depth(replay), 0.003 * np.sin(np.pi * np.linspace(0.1, 0.9, 5)), atol=1e-8
     )
 
 
@@ -54,14 +48,19 @@ def test_depth_from_the_side_and_at_an_edge_is_measured_along_the_shortest_way(
         [half[0] + 0.006, 0, 0.01],
         [0, 0, 0.001],
     ]
-    depth = depth_of(moved(replay, tool_raw=np.array(centres)))
+    depth = push_depth(moved(replay, tool_raw=np.array(centres)))
     np.testing.assert_allclose(depth, [0.001, 0.0, 0.0, 0.005 + half[1]], atol=1e-7)
 
 
-def test_what_is_no_box_has_no_depth(replay: RecordedReplay) -> None:
-    rest = np.array(replay["rest"], dtype=float)
-    dome = rest - np.array([0, 0, 1.0]) * (4.0 * rest[:, :1] ** 2)
-    assert push_depth(moved(replay, rest=dome)) is None
+def test_depth_in_a_free_form_is_measured_along_its_normals(replay: RecordedReplay) -> None:
+    body = dome((0.04, 0.03, 0.025))
+    surface = body.surface(2.5e-3)
+    places = body.surface_points()[::100]
+    normals = body.facing(places)[1]
+    deep = np.linspace(-0.002, 0.003, len(places))
+    centres = places + (0.005 - deep)[:, None] * normals
+    found = push_depth(moved(replay, rest=surface.vertices, faces=surface.faces, tool_raw=centres))
+    np.testing.assert_allclose(found, np.maximum(deep, 0.0), atol=1e-4)
 
 
 def test_spells_of_touch_are_first_and_last_frames() -> None:

@@ -94,8 +94,13 @@ def test_a_place_of_ones_own_is_looked_from_in_scenes_that_open_later(
 )
 def test_standard_views_look_along_an_axis(where: Any, axis: int, sign: int) -> None:
     found = viewpoint_for(
-        np.array([0.07, 0.04, 0.036]), np.array([0.2, -0.1, 0.2]), ((0.0, 0.0, 0.0),), where
+        np.array([-0.01, -0.02, 0.0]),
+        np.array([0.06, 0.02, 0.036]),
+        np.array([0.2, -0.1, 0.2]),
+        ((0.0, 0.0, 0.0),),
+        where,
     )
+    assert found.target == pytest.approx([0.025, 0.0, 0.018], abs=1e-3)
     away = found.position - found.target
     assert sign * away[axis] > 0.99 * np.linalg.norm(away)
 

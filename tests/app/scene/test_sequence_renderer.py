@@ -16,6 +16,7 @@ from palpate.app.drawing.figures import (
     SurfaceFigure,
     ToolFigure,
 )
+from palpate.app.drawing.free_surface import FreeSurface
 from palpate.app.drawing.view import Layer, View
 from palpate.app.scene.annotations import TICK, TICKS_APART, Annotations, annotations_of
 from palpate.app.scene.page_session import Session
@@ -24,6 +25,7 @@ from palpate.app.scene.sequence_renderer import MOST_TRIANGLES, SequenceRenderer
 from palpate.app.scene.stiffness_surface import StiffnessSurface
 from palpate.app.storage.run_store import Run
 from palpate.setup.box import Box
+from palpate.setup.phantom_geometry import Geometry
 
 ALL: tuple[Layer, ...] = ("measured", "raw", "extended", "tool")
 
@@ -239,11 +241,16 @@ def test_lump_landmarks_base_and_path_are_layers(renderer: SequenceRenderer) -> 
     assert renderer.lumps == 1 and renderer.landmarks == 0
 
 
+def free(body: Geometry) -> FreeSurface:
+    surface = body.surface()
+    return FreeSurface.of(surface.vertices, surface.faces)
+
+
 def test_hatching_follows_the_base_of_a_free_form_and_of_a_block() -> None:
     none = np.empty((0, 3))
     bare = Annotations(none, none)
     for body in (dome((0.04, 0.03, 0.025)), Box(size=(0.06, 0.04, 0.03))):
-        figure = bare.base_figures(body.surface().vertices, extended=False)["base"]
+        figure = bare.base_figures(free(body), extended=False)["base"]
         assert isinstance(figure, LinesFigure)
         ends = figure.segments.reshape(-1, 3).astype(float) * [1.0, 1.0, 0.0]
         assert np.abs(body.outside(ends)).max() < 3e-3
@@ -251,7 +258,7 @@ def test_hatching_follows_the_base_of_a_free_form_and_of_a_block() -> None:
         ticks = np.abs(lengths - TICK) < 1e-6
         assert ticks.sum() == pytest.approx(lengths[~ticks].sum() / TICKS_APART, abs=1)
     loose = Annotations(none, none, loose=(("-x", 0.02),))
-    block = Box(size=(0.06, 0.04, 0.03)).surface().vertices
+    block = free(Box(size=(0.06, 0.04, 0.03)))
     whole, part = (loose.base_figures(block, extended)["base"] for extended in (False, True))
     assert isinstance(whole, LinesFigure) and isinstance(part, LinesFigure)
     assert len(part.segments) < len(whole.segments)
