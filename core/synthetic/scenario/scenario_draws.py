@@ -127,6 +127,7 @@ _CLEAR: Mapping[str, _Draw] = {
     "permanent_set": lambda rng: {"retained_fraction": _between(rng, 0.12, 0.3, 3)},
     "tool_friction": lambda rng: {"friction_coefficient": _between(rng, 0.3, 0.8, 3)},
     "stiff_tube": _tube,
+    "geometry_local": lambda rng: {"rms": _between(rng, 0.35e-3, 0.6e-3, 6)},
 }
 
 
@@ -179,6 +180,7 @@ _SHRINKING = (
     "relaxed_fraction",
     "retained_fraction",
     "friction_coefficient",
+    "rms",
 )
 _GROWING = ("J_m", "stiffness_over_E")
 """Parameters that are neutral at infinity; the strength of the effect goes with their inverse."""
