@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.effects.base import Effect
+from palpate.effects.cast import GeometryLocal
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
 from palpate.effects.geometry import GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
@@ -59,6 +60,7 @@ _COUNTED: tuple[type[Effect], ...] = (
     LandmarkMismatch,
     MeshResolution,
     StiffTube,
+    GeometryLocal,
 )
 _REPLAYED: tuple[type[Effect], ...] = (YoungModulus,)
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))

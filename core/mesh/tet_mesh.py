@@ -69,7 +69,11 @@ class TetMesh:
         """The same tetrahedra in a body whose coordinates are multiplied by these factors (3,)
         [1].
         """
-        made = TetMesh(self.corners * factors, self.tetrahedra, self.held)
+        return self.with_corners(self.corners * factors)
+
+    def with_corners(self, corners: FloatArray) -> TetMesh:
+        """The same tetrahedra with their corners (c, 3) at other rest positions [m]."""
+        made = TetMesh(corners, self.tetrahedra, self.held)
         # Cached properties that do not depend on coordinates.
         vars(made).update(_edges=self._edges, connectivity=self.connectivity)
         return made
