@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.effects.base import Effect
-from palpate.effects.cast import GeometryLocal
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
-from palpate.effects.geometry import GeometryScale, MeshResolution
+from palpate.effects.geometry import GeometryLocal, GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
     Anisotropy,
     StiffnessGradient,

@@ -26,6 +26,7 @@ def applicable_effects(
     return tuple(
         kind
         for kind in catalogue
-        if any(made[item] for item in kind.shown_by) and (box or not kind.needs_box)
+        if any(made[item] for item in kind.shown_by)
+        and (box or not kind.needs_box)
         and not (box and kind.needs_shape)
     )

@@ -88,9 +88,11 @@ class Truth:
         """The entries of the disturbances and of the nuisances, where there are any."""
         entries = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
         nuisances = described(self.nuisances)
-        return ({"disturbances": entries} if entries else {}) | (
-            {"nuisances": nuisances} if nuisances else {}
-        ) | ({"cast_mm": round(1e3 * self.cast, 4)} if self.cast else {})
+        return (
+            ({"disturbances": entries} if entries else {})
+            | ({"nuisances": nuisances} if nuisances else {})
+            | ({"cast_mm": round(1e3 * self.cast, 4)} if self.cast else {})
+        )
 
     def save(self, path: Path) -> None:
         """Write JSON."""
