@@ -30,9 +30,9 @@ from palpate.foundation.errors import EffectError
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.box_mesh import GridSpec
-from palpate.replay.replay import Equilibrium, replay
-from palpate.mesh.push_meshes import SCREEN_PUSHES
 from palpate.mesh.protocol import Meshing
+from palpate.mesh.push_meshes import SCREEN_PUSHES
+from palpate.replay.replay import Equilibrium, replay
 from palpate.setup.setup import Box, Setup, Tool, Touching
 from palpate.synthetic.bodies.shape_families import draw_shape
 
@@ -156,7 +156,9 @@ def test_catalogue_speaks_the_vocabulary():
 
 @EACH
 def test_report_states_the_parameters_by_name_and_unit(effect):
-    reported = {name: unit for name, (_, unit) in _example(effect).reported(_stated(effect)).items()}
+    reported = {
+        name: unit for name, (_, unit) in _example(effect).reported(_stated(effect)).items()
+    }
     assert VOCABULARY[effect.name].items() <= reported.items()
 
 
