@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,3 +97,5 @@ def test_block_has_no_local_offset() -> None:
     assert GeometryLocal.neutral(block).apply(block) == block
     with pytest.raises(SetupError, match="state the block's surface as a file"):
         GeometryLocal.of([1e-4]).apply(block)
+    with pytest.raises(SetupError, match="cast has 2 coefficients; state 24, or none"):
+        replace(STATED, cast=(1e-4, 2e-4))
