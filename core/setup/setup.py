@@ -15,7 +15,7 @@ from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
 from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
-from palpate.setup.free_form.cast_modes import CAST_MODES, cast_modes
+from palpate.setup.free_form.cast_modes import cast_modes, check_cast
 from palpate.setup.free_form.cast_surface import CastSurface
 from palpate.setup.free_form.shape import Shape
 from palpate.setup.landmark_touches import PAIRINGS, Touching, Tracing
@@ -212,19 +212,7 @@ class Setup:
             raise SetupError(message, key="misses")
         if isinstance(self.geometry, Shape):
             self._check_shape(self.geometry)
-            self._check_cast()
-        elif self.cast:
-            raise SetupError(
-                "the cast of a block has no local offset here; state the block's surface as a file",
-                key="cast",
-            )
-
-    def _check_cast(self) -> None:
-        """Refuse another number of coefficients than there are modes."""
-        if len(self.cast) not in (0, CAST_MODES):
-            raise SetupError(
-                f"cast has {len(self.cast)} coefficients; state {CAST_MODES}, or none", key="cast"
-            )
+        check_cast(self.cast, self.geometry.is_block)
 
     def _check_shape(self, shape: Shape) -> None:
         """Refuse a detached part of a base that is not flat."""

@@ -15,9 +15,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.foundation.arrays import BoolArray, FloatArray
+from palpate.foundation.errors import SetupError
 from palpate.setup.free_form.shape import Shape
 
-__all__ = ["CAST_MODES", "CastModes", "cast_modes"]
+__all__ = ["CAST_MODES", "CastModes", "Coefficients", "cast_modes", "check_cast"]
 
 CAST_MODES = 24
 """Number of modes: nine tenths and more of such a field on bodies up to the size of a hand."""
@@ -88,6 +89,21 @@ class CastModes:
             return np.zeros_like(points)
         heights, normals = self.at(points)
         return np.asarray((heights @ np.array(coefficients))[:, None] * normals)
+
+
+def check_cast(coefficients: Coefficients, is_block: bool) -> None:
+    """Raise SetupError for an offset of a block, and for another number of coefficients than there
+    are modes; none at all are no offset.
+    """
+    if coefficients and is_block:
+        raise SetupError(
+            "the cast of a block has no local offset here; state the block's surface as a file",
+            key="cast",
+        )
+    if len(coefficients) not in (0, CAST_MODES):
+        raise SetupError(
+            f"cast has {len(coefficients)} coefficients; state {CAST_MODES}, or none", key="cast"
+        )
 
 
 @lru_cache(maxsize=8)

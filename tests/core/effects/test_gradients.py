@@ -196,7 +196,7 @@ def _cast(*coefficients: float) -> Setup:
 
 @pytest.mark.parametrize(
     ("setup", "changed"),
-    [(_cast(), _cast(2e-6)), (_cast(4e-4, 3e-4), _cast(4e-4, 3e-4, 2e-6))],
+    [(_cast(), _cast(2e-6)), (_cast(4e-4, 3e-4), _cast(4.02e-4, 3e-4))],
     ids=["from none", "from one"],
 )
 def test_sensitivity_to_the_cast_is_the_difference_of_two_solves(setup, changed):
