@@ -46,9 +46,16 @@ DEEPEST = 0.4 * SIZE[2]
 LONGEST_JUMP = 5e-3
 BY_SIZE, SIZED = 0.1, Grading(spacing=1.3e-3, along=0.8, inward=1.0, longest=0.35)
 """Share of situations on a graded mesh [1], and that mesh, slightly coarser than a diagnosis's."""
-DRAWN = ("geometry_scale", "landmark_mismatch", "young_modulus", "mesh_resolution", "stiff_tube")
+DRAWN = (
+    "geometry_scale",
+    "landmark_mismatch",
+    "young_modulus",
+    "mesh_resolution",
+    "stiff_tube",
+    "geometry_local",
+)
 """Effects that a situation does not draw: those that change what it draws itself (stiffness, tool
-position and mesh), and one that would change what a seed draws."""
+position and mesh), one that would change what a seed draws, and one that no block can have."""
 INSIDE = 5e-4
 """Depth [m] of a surface point inside the tool above which it is a fault."""
 

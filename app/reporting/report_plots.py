@@ -1,4 +1,4 @@
-"""Plots of a report: the error of each frame by sequence."""
+"""Plots of a report: the error of each frame by sequence, and maps of a cast's offset."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from palpate.app.drawing import colours
 from palpate.app.reporting.svg_figure import INK, to_svg
 from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.figure import new_figure
 
-__all__ = ["drawn_errors", "error_plots"]
+__all__ = ["drawn_errors", "error_plots", "field_map"]
 
 _COLUMNS, _HEADROOM = 3, 1.06
+_VIEWS = (("from above", "x", "y", 1.0), ("from -y", "x", "z", -1.0), ("from +x", "y", "z", 1.0))
+"""Views of a map: name, axis to the right, axis upwards, and sign of the way to the viewer along
+the third axis."""
 
 
 def error_plots(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> str:
@@ -52,6 +56,45 @@ def drawn_errors(replays: Sequence[RecordedReplay], splits: dict[str, str]) -> A
     drawn.supxlabel("time [s]", fontsize=9, color=INK["text-3"])
     drawn.supylabel("error [mm]", fontsize=9, color=INK["text-3"])
     return drawn
+
+
+def field_map(cause: dict[str, Any]) -> str:
+    """Offset [mm] of a cast from its drawing, seen from three sides; empty for a cause without a
+    `field`.
+    """
+    field = cause.get("field") or {}
+    places = 1e3 * np.array(field.get("places") or np.zeros((0, 3)), dtype=float)
+    if not len(places):
+        return ""
+    from matplotlib.colors import ListedColormap
+
+    offset = np.array(field["offset"], dtype=float)
+    end = 1e3 * colours.nice_limit(offset)
+    shades = ListedColormap(np.array(colours.SIGNED) / 255.0)
+    drawn = new_figure(9.0, 2.6)
+    panels = drawn.subplots(1, len(_VIEWS), squeeze=False).ravel()
+    for axes, (view, right, up, sign) in zip(panels, _VIEWS, strict=True):
+        first, second = "xyz".index(right), "xyz".index(up)
+        towards = sign * places[:, 3 - first - second]
+        # What is nearer to the viewer is drawn last.
+        order = np.argsort(towards)
+        points = axes.scatter(
+            places[order, first],
+            places[order, second],
+            c=1e3 * offset[order],
+            cmap=shades,
+            vmin=-end,
+            vmax=end,
+            s=16,
+            linewidths=0,
+        )
+        axes.set_aspect("equal")
+        axes.set_title(view, fontsize=9, color=INK["text"], loc="left")
+        axes.set_xlabel(f"{right} [mm]", fontsize=9)
+        axes.set_ylabel(f"{up} [mm]", fontsize=9)
+    bar = drawn.colorbar(points, ax=panels.tolist(), shrink=0.9)
+    bar.set_label("cast over drawing [mm]", fontsize=9, color=INK["text-3"])
+    return to_svg(drawn)
 
 
 def _largest(replay: RecordedReplay) -> float:

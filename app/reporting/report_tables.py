@@ -8,6 +8,7 @@ from typing import Any
 
 from palpate.app.reporting.html_page import Bar, Cell, Table
 from palpate.app.reporting.model_comparison import SequenceErrors
+from palpate.app.reporting.report_plots import field_map
 from palpate.app.reporting.sentences import limit_phrase
 from palpate.foundation.quantities import NARROW, value_and_ends, words
 
@@ -38,11 +39,19 @@ _SIMILAR = 0.3
 
 @dataclass(frozen=True)
 class NamedCause:
-    """A cause with its probability, and its parameters with their intervals."""
+    """A cause with its probability, and its parameters with their intervals.
+
+    Attributes:
+        effect: its name.
+        probability: as text.
+        parameters: with their intervals.
+        map: of a field over the surface, as SVG; empty without one.
+    """
 
     effect: str
     probability: str
     parameters: Table
+    map: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,8 @@ def named_causes(causes: Sequence[dict[str, Any]]) -> list[NamedCause]:
         ]
         rows += _in_file_frame(cause.get("in_file_frame", {}))
         table = Table(("", "value", "interval"), rows)
-        named.append(NamedCause(cause["effect"], percent(cause.get("probability")), table))
+        chance = percent(cause.get("probability"))
+        named.append(NamedCause(cause["effect"], chance, table, field_map(cause)))
     return named
 
 

@@ -1,4 +1,6 @@
-"""Figures around the models: touched landmarks, fixed base, lumps, tubes, and the tool's path."""
+"""Figures around the models: touched landmarks, fixed base, lumps, tubes, a cast's offset, and the
+tool's path.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +21,20 @@ from palpate.app.storage.run_store import Run
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 
-__all__ = ["Annotations", "Lump", "TubeAlong", "annotations_of", "path_lines", "swept"]
+__all__ = [
+    "Annotations",
+    "CastOffset",
+    "Lump",
+    "TubeAlong",
+    "annotations_of",
+    "path_lines",
+    "swept",
+]
 
 CROSS, TOUCH = 2.5e-3, 7e-4
 """Size of a landmark's cross and radius of a touch's bead [m]."""
+OFFSET = 6e-4
+"""Radius of a bead of a cast's offset [m]."""
 TICK, TICKS_APART = 2.6e-3, 3.2e-3
 """Length and spacing of the hatching [m]."""
 RAISED = 2e-4
@@ -53,6 +65,30 @@ class TubeAlong:
 
 
 @dataclass(frozen=True, eq=False)
+class CastOffset:
+    """Offset (k,) [m] of a cast from its drawing, at places (k, 3) [m] of the drawing's surface."""
+
+    places: FloatArray
+    offset: FloatArray
+
+    def figures(self, layer: ModelLayer, frame: int, opacity: float) -> dict[str, Figure]:
+        """A bead at each place, in the colour of its offset."""
+        moved = layer.moved(frame, self.places)
+        at = self.places if moved is None else moved
+        bands = colours.band_of(self.offset, colours.nice_limit(self.offset))
+        ball, faces = sphere(6, 4)
+        figures: dict[str, Figure] = {}
+        for band in np.unique(bands):
+            own = at[bands == band]
+            beads = (own[:, None] + OFFSET * ball).reshape(-1, 3)
+            turns = (faces + len(ball) * np.arange(len(own))[:, None, None]).reshape(-1, 3)
+            figures[f"cast-{band:02d}"] = SurfaceFigure(
+                float32(beads), turns, colours.SIGNED[band], opacity
+            )
+        return figures
+
+
+@dataclass(frozen=True, eq=False)
 class Annotations:
     """Annotations of one run, phantom frame.
 
@@ -64,6 +100,7 @@ class Annotations:
         lumps: balls among the causes.
         tubes: tubes among them.
         stiffness: free map of the stiffness; None without one.
+        casts: offsets of the cast among them.
     """
 
     landmarks: FloatArray
@@ -72,11 +109,12 @@ class Annotations:
     lumps: tuple[Lump, ...] = ()
     tubes: tuple[TubeAlong, ...] = ()
     stiffness: StiffnessSurface | None = None
+    casts: tuple[CastOffset, ...] = ()
 
     @property
     def inclusions(self) -> int:
-        """Number of lumps and tubes."""
-        return len(self.lumps) + len(self.tubes)
+        """Number of lumps, tubes and offsets of the cast."""
+        return len(self.lumps) + len(self.tubes) + len(self.casts)
 
     def landmark_figures(self) -> dict[str, Figure]:
         """A cross at each landmark, a bead where it was touched, and a line between them."""
@@ -127,9 +165,11 @@ class Annotations:
 
     def lump_figures(self, layer: ModelLayer, frame: int, opacity: float) -> dict[str, Figure]:
         """Each lump as a ball, inside the ellipsoid of all its places within the intervals; each
-        tube as a circle swept along its axis, inside a wider one.
+        tube as a circle swept along its axis, inside a wider one; an offset of the cast as beads.
         """
         figures: dict[str, Figure] = {}
+        for cast in self.casts:
+            figures.update(cast.figures(layer, frame, opacity))
         ball, faces = sphere(28, 18)
         for number, lump in enumerate(self.lumps):
             centre = np.array([value for _, value, _ in lump.centre])
@@ -190,8 +230,9 @@ def annotations_of(run: Run) -> Annotations:
     strips = (setup.get("support") or {}).get("detached") or []
     loose = tuple((str(strip["edge"]), float(strip["extent"])) for strip in strips)
     causes = run.report.get("causes", [])
-    inclusions = tuple(_lumps(causes)), tuple(_tubes(causes))
-    return Annotations(landmarks, touches, loose, *inclusions, stiffness_surface_of(run.report))
+    inside = tuple(_lumps(causes)), tuple(_tubes(causes))
+    stiffness, casts = stiffness_surface_of(run.report), tuple(_casts(causes))
+    return Annotations(landmarks, touches, loose, *inside, stiffness, casts)
 
 
 def _lumps(causes: Sequence[dict[str, Any]]) -> list[Lump]:
@@ -217,6 +258,15 @@ def _tubes(causes: Sequence[dict[str, Any]]) -> list[TubeAlong]:
             axis = np.array(line, dtype=float)
             tubes.append(TubeAlong(axis, _span(parameters["radius"]), (high - low) / 2))
     return tubes
+
+
+def _casts(causes: Sequence[dict[str, Any]]) -> list[CastOffset]:
+    """Offsets of the causes that state their `field`."""
+    return [
+        CastOffset(np.array(field["places"], dtype=float), np.array(field["offset"], dtype=float))
+        for field in (cause.get("field") for cause in causes)
+        if field and field["places"]
+    ]
 
 
 def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:

@@ -99,7 +99,7 @@ class SequenceRenderer:
 
     @property
     def lumps(self) -> int:
-        """Number of lumps and tubes that can be shown."""
+        """Number of lumps, tubes and offsets of the cast that can be shown."""
         return self._annotations.inclusions
 
     @property

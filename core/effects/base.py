@@ -72,6 +72,8 @@ class Effect(ABC):
     """Kinds of measurement any of which shows the effect."""
     needs_box: ClassVar[bool] = False
     """Whether only a box can have it, and no body of another shape."""
+    needs_shape: ClassVar[bool] = False
+    """Whether only a free form can have it, and no block."""
     kinked: ClassVar[bool] = False
     """Whether something begins or ends with its numbers, as a slide does: a fit then tries values
     to either side, and single pushes have no derivative by them."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from palpate.effects.base import Effect
 from palpate.effects.elastic_material import PoissonRatio, StiffInclusion, YoungModulus
-from palpate.effects.geometry import GeometryScale, MeshResolution
+from palpate.effects.geometry import GeometryLocal, GeometryScale, MeshResolution
 from palpate.effects.heterogeneity import (
     Anisotropy,
     StiffnessGradient,
@@ -59,6 +59,7 @@ _COUNTED: tuple[type[Effect], ...] = (
     LandmarkMismatch,
     MeshResolution,
     StiffTube,
+    GeometryLocal,
 )
 _REPLAYED: tuple[type[Effect], ...] = (YoungModulus,)
 OUTSIDE = outside_effects(effect.name for effect in (*_COUNTED, *_REPLAYED))

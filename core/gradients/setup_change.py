@@ -9,7 +9,9 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
+from palpate.mesh.cast_mesh import recast
 from palpate.mesh.protocol import Mesh
+from palpate.mesh.tet_mesh import TetMesh
 from palpate.replay.material_history import require_memoryless
 from palpate.replay.replay import Equilibrium, Replay
 from palpate.setup.setup import Setup
@@ -64,14 +66,16 @@ def same_body(block: Replay, setup: Setup) -> bool:
     """
     here = block.setup
     material = replace(setup.material, young_modulus=here.material.young_modulus)
-    parts = ("load", "support", "geometry")
+    parts = ("load", "support", "geometry", "cast")
     return material == here.material and all(
         getattr(setup, part) == getattr(here, part) for part in parts
     )
 
 
 def mesh_in(block: Replay, setup: Setup, frame: Equilibrium) -> Mesh:
-    """The frame's mesh, scaled to the setup's body if that has another size."""
+    """The frame's mesh, moved to the setup's body if that has another size or another cast."""
+    if setup.cast != block.setup.cast and isinstance(frame.mesh, TetMesh):
+        return recast(frame.mesh, block.setup, setup)
     if setup.geometry == block.setup.geometry:
         return frame.mesh
     return frame.mesh.scaled(np.array(setup.geometry.size) / np.array(block.setup.geometry.size))

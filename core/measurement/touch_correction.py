@@ -31,7 +31,8 @@ __all__ = ["touch_correction", "touch_misses", "touched_places"]
 
 def touched_places(setup: Setup) -> FloatArray:
     """True places (n, 3) [m], phantom frame, of the touches on the block before it sags."""
-    landmarks, touching = np.array(setup.landmarks) * setup.scale, setup.touching
+    stated, touching = np.array(setup.landmarks), setup.touching
+    landmarks = (stated + setup.cast_motion(stated)) * setup.scale
     places = landmarks[touching.order(len(landmarks))]
     middle = places.mean(axis=0)
     inwards = np.sign(np.round(middle - places, 9)) * np.array([1.0, 1.0, 0.0])
@@ -50,7 +51,10 @@ def touch_correction(setup: Setup, grid: Meshing) -> Transform:
 
 
 def _trace_correction(setup: Setup, tracing: Tracing, grid: Meshing) -> Transform:
-    """Motion that puts the traced points on the surface of the true body, as it sags."""
+    """Motion that puts the traced points on the surface of the true body, as it sags.
+
+    An offset of the cast, which waves over the traced surface, is taken not to move the fit.
+    """
     sags, geometry = setup.load.specific_weight_over_stiffness, setup.geometry
     if not (sags or setup.registered is not None or setup.tool.radius != tracing.radius):
         return Transform()
@@ -87,6 +91,7 @@ def _as_stated(setup: Setup) -> bool:
     moved = (
         setup.load.specific_weight_over_stiffness
         or setup.registered is not None
+        or setup.cast
         or stated != plain
         or (stated.normals and stated.lift != setup.tool.radius)
     )

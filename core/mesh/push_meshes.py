@@ -14,9 +14,10 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import MeshError
+from palpate.mesh.cast_mesh import as_built
 from palpate.mesh.protocol import FINER
 from palpate.mesh.tet_fill import TetSpec, check_spacing, fill
-from palpate.mesh.tet_mesh import TetMesh, stretched
+from palpate.mesh.tet_mesh import TetMesh
 from palpate.setup.free_form.closest_point import nearest
 from palpate.setup.free_form.shape import Shape
 
@@ -79,8 +80,7 @@ class PushMeshSpec:
                 f"{shape.name}: no place that is pushed was named; name one at least", places=0
             )
         number = int(np.linalg.norm(np.array(self.places) - centre, axis=1).argmin())
-        made = _filled(shape, self.places[number], replace(self, places=()))
-        return made if setup.registered is None else stretched(made, setup.factors)
+        return as_built(_filled(shape, self.places[number], replace(self, places=())), setup)
 
     def finer(self) -> Self:
         """The same with nodes FINER times closer."""

@@ -13,10 +13,11 @@ import numpy as np
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError, SetupError
+from palpate.mesh.cast_mesh import as_built
 from palpate.mesh.meshers.mesh_cache import cached_tetrahedra
 from palpate.mesh.meshers.mesher_choice import SizeField, TetMesher, chosen_mesher
 from palpate.mesh.protocol import FINER
-from palpate.mesh.tet_mesh import TetMesh, sides_of, stretched
+from palpate.mesh.tet_mesh import TetMesh, sides_of
 from palpate.setup.free_form.closest_point import nearest
 from palpate.setup.free_form.shape import Shape
 
@@ -81,8 +82,7 @@ class TetSpec:
 
     def mesh(self, setup: Setup, centre: FloatArray) -> TetMesh:
         """The mesh, the same for all positions of the tool's centre."""
-        made = fill(setup.stated_shape, self)
-        return made if setup.registered is None else stretched(made, setup.factors)
+        return as_built(fill(setup.stated_shape, self), setup)
 
     def finer(self) -> TetSpec:
         """The same with nodes FINER times closer."""

@@ -72,7 +72,11 @@ class TetMesh:
         """The same tetrahedra in a body whose coordinates are multiplied by these factors (3,)
         [1].
         """
-        made = replace(self, corners=self.corners * factors)
+        return self.with_corners(self.corners * factors)
+
+    def with_corners(self, corners: FloatArray) -> TetMesh:
+        """The same tetrahedra with their corners (c, 3) at other rest positions [m]."""
+        made = replace(self, corners=corners)
         # Cached properties that do not depend on coordinates.
         vars(made).update(_edges=self._edges, connectivity=self.connectivity)
         return made

@@ -142,7 +142,8 @@ def _looks_alike(one: Setup, other: Setup) -> bool:
     return camera_model_for(one).same(camera_model_for(other)) and (
         one.geometry,
         one.registered,
-    ) == (other.geometry, other.registered)
+        one.cast,
+    ) == (other.geometry, other.registered, other.cast)
 
 
 def record(

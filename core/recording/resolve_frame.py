@@ -99,8 +99,8 @@ class FrameResolver:
         """One finite size of each effect of the catalogue, to start from by hand."""
         result = []
         for effect in DIAGNOSED:
-            starts = effect.starts(self.stated)
-            if starts:
+            possible = not (effect.needs_shape and self.stated.geometry.is_block)
+            if possible and (starts := effect.starts(self.stated)):
                 result.append(starts[len(starts) // 2].to_json())
         return result
 

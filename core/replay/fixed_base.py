@@ -135,7 +135,7 @@ class FixedBaseReplay:
             5e-4
             if self.setup.load.specific_weight_over_stiffness or self.setup.material.has_history
             else 0.0
-        )
+        ) + self.setup.largest_offset
         nearest = self.setup.geometry.nearest(tool.centre[None])[0]
         return bool(np.linalg.norm(tool.centre - nearest) > tool.radius + slack)
 

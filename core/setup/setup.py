@@ -15,6 +15,8 @@ from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
 from palpate.setup.bounds import require_within
 from palpate.setup.box import Box
+from palpate.setup.free_form.cast_modes import cast_modes, check_cast
+from palpate.setup.free_form.cast_surface import CastSurface
 from palpate.setup.free_form.shape import Shape
 from palpate.setup.landmark_touches import PAIRINGS, Touching, Tracing
 from palpate.setup.material import (
@@ -177,6 +179,8 @@ class Setup:
         tracing: the traces by which the robot was registered; None unless it was by traces.
         phantom_from_robot: the stated registration of the robot.
         phantom_from_camera: the stated registration of the camera.
+        cast: factors of the modes of `palpate.setup.free_form.cast_modes` [m], by which the cast of
+            a free form is offset from the stated surface; empty for none.
         element_size: edge length of the even grid that replaces any other mesh of a replay [m];
             None for none.
     """
@@ -194,6 +198,7 @@ class Setup:
     tracing: Tracing | None = None
     phantom_from_robot: Transform = field(default_factory=Transform)
     phantom_from_camera: Transform = field(default_factory=Transform)
+    cast: tuple[float, ...] = ()
     element_size: float | None = None
 
     def __post_init__(self) -> None:
@@ -207,6 +212,7 @@ class Setup:
             raise SetupError(message, key="misses")
         if isinstance(self.geometry, Shape):
             self._check_shape(self.geometry)
+        check_cast(self.cast, self.geometry.is_block)
 
     def _check_shape(self, shape: Shape) -> None:
         """Refuse a detached part of a base that is not flat."""
@@ -251,7 +257,23 @@ class Setup:
     def surface(self, spacing: float = SPACING, patch: float = PATCH) -> Surface:
         """The free surface of the body, see `Geometry.surface`."""
         edge = max(LEAST_EDGE, self.sensor.edge)
-        return self.geometry.surface(spacing, patch, self.registered, edge)
+        under = self.geometry.surface(spacing, patch, self.registered, edge)
+        if not self.cast:
+            return under
+        return CastSurface(under, cast_modes(self.stated_shape), self.cast)
+
+    def cast_motion(self, places: FloatArray) -> FloatArray:
+        """Motion (m, 3) [m] from places (m, 3) [m] of the stated free surface to those of the cast,
+        without another size of the body.
+        """
+        if not self.cast:
+            return np.zeros_like(places)
+        return cast_modes(self.stated_shape).motion(self.cast, places)
+
+    @property
+    def largest_offset(self) -> float:
+        """Largest offset of the cast from the stated surface, either way [m]."""
+        return cast_modes(self.stated_shape).largest(self.cast) if self.cast else 0.0
 
     @property
     def has_history(self) -> bool:
@@ -311,6 +333,7 @@ class Setup:
             "landmarks": [list(place) for place in self.landmarks],
             "touching": self.touching.as_dict(),
             **({} if self.tracing is None else {"tracing": vars(self.tracing)}),
+            **({"cast": list(self.cast)} if self.cast else {}),
             "element_size": self.element_size,
             "mass": self.mass,
             "phantom_from_robot": self.phantom_from_robot.matrix.tolist(),

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import EffectError
 from palpate.foundation.frames import Transform
 from palpate.foundation.processes import ProcessPool
 from palpate.foundation.progress import Report, silent
@@ -51,8 +52,14 @@ def make_dataset(
     """Make the dataset `folder` and its truth `<folder>.truth.json`, both whole or neither.
 
     The same scenario and seed give the same files, whatever the number of workers. Raises RunError
-    where `folder` exists.
+    where `folder` exists, and EffectError for an effect that only free forms can have.
     """
+    if scenario.hidden("geometry_local"):
+        raise EffectError(
+            "the virtual bench casts no block that differs from its drawing; hide geometry_local "
+            "in a shape (`draw_shape_scenario`)",
+            effect="geometry_local",
+        )
     truth = write_atomically(folder, lambda aside: _fill(aside, scenario, seed, workers, report))
     report(1.0, f"made {folder.name}")
     return truth

@@ -25,6 +25,7 @@ from palpate.synthetic.bench.motion_plan import MotionPlan
 from palpate.synthetic.bench.sequence_recording import SequenceJob
 from palpate.synthetic.bench.true_body import true_radius
 from palpate.synthetic.bench.virtual_experiment import rest_surface
+from palpate.synthetic.bodies.cast_form import CastForm
 from palpate.synthetic.bodies.organ_shape import write_surface
 from palpate.synthetic.bodies.robot_relation import ROBOT_RELATIONS, Bench
 from palpate.synthetic.bodies.shape_draws import (
@@ -72,6 +73,8 @@ class ShapeScenario:
         scenario: beliefs and hidden effects; its size is the shape's.
         robot: how robot and phantom are related, one of `ROBOT_RELATIONS`.
         table: whether the camera gets readings of the table.
+        cast: RMS offset of the cast's free surface from the stated one [m], for which nothing is to
+            be named; a hidden `geometry_local` states its own.
     """
 
     family: str
@@ -79,6 +82,7 @@ class ShapeScenario:
     scenario: Scenario
     robot: str = "touches"
     table: bool = True
+    cast: float = 0.0
 
     @cached_property
     def stated(self) -> Shape:
@@ -88,8 +92,26 @@ class ShapeScenario:
     @cached_property
     def true(self) -> Shape:
         """The body on the bench."""
-        factors = np.array(self.scenario.true_size) / np.array(self.scenario.size)
-        return self.stated.scaled(factors)
+        return self.form.of(self.stated).scaled(self.factors)
+
+    @property
+    def form(self) -> CastForm:
+        """The cast's own offset."""
+        hidden = self.scenario.hidden("geometry_local")
+        return CastForm(hidden.value("rms") if hidden else self.cast, self.seed)
+
+    @property
+    def factors(self) -> FloatArray:
+        """True over stated lengths along x, y, z (3,) [1], before the cast's own offset."""
+        return np.asarray(np.array(self.scenario.true_size) / np.array(self.scenario.size))
+
+    def on_true(self, places: FloatArray) -> FloatArray:
+        """Places (n, 3) [m] of the true surface that lie at places of the stated surface."""
+        scaled = np.asarray(places * self.factors)
+        if self.form.rms == 0.0:
+            return scaled
+        distance, normals = self.true.facing_free(scaled)
+        return scaled - distance[:, None] * normals
 
 
 def draw_shape_scenario(
@@ -192,7 +214,7 @@ def _fill(folder: Path, drawn: ShapeScenario, seed: int, workers: int, report: R
         )
         for motion in _motions(drawn, camera, seed)
     ]
-    return record_all(jobs, workers, report)
+    return replace(record_all(jobs, workers, report), cast=drawn.cast)
 
 
 def _marks(shape: Shape) -> dict[str, FloatArray]:
@@ -212,8 +234,7 @@ def _touched(
 ) -> FloatArray:
     """Touch the marks (n, 3) [m] on the true body, with the error of a careful hand."""
     scenario, (rest, settled) = drawn.scenario, surface
-    factors = np.array(scenario.true_size) / np.array(scenario.size)
-    places = np.array(list(marks.values())) * factors
+    places = drawn.on_true(np.array(list(marks.values())))
     near = [int(np.linalg.norm(rest - place, axis=1).argmin()) for place in places]
     touched = places + settled[near] + (0.0, 0.0, scenario.touch_offset)
     return np.asarray(touched + rng.normal(size=touched.shape) * TOUCH_NOISE)

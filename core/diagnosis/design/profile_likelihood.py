@@ -155,6 +155,13 @@ def profiles(
     ]
     told: list[dict[str, str]] = [{} for _ in model.effects]
     unsure, left, rows = vague(covariance, items), CRITERIA.verdict.profile_evaluations, []
+    # Numbers that no report states, such as coefficients of a field, are no quantities to pin down.
+    stated = [
+        item.name in effect.reported(model.setup)
+        for effect in model.effects
+        for item in effect.numbers()
+    ]
+    unsure = [index for index in unsure if stated[index]]
     for index, (place, item) in enumerate(zip((place for place, _ in names), items, strict=True)):
         if index not in unsure:
             told[place][item.name] = "interval"

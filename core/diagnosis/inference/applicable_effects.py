@@ -16,7 +16,7 @@ def applicable_effects(
     """Return the effects that these measurements can show, in the catalogue's order.
 
     Args:
-        setup: as stated; some effects need a box.
+        setup: as stated; some effects need a box, some a free form.
         clouds: whether any sequence has clouds.
         forces: whether any has forces.
         catalogue: to choose from.
@@ -26,5 +26,7 @@ def applicable_effects(
     return tuple(
         kind
         for kind in catalogue
-        if any(made[item] for item in kind.shown_by) and (box or not kind.needs_box)
+        if any(made[item] for item in kind.shown_by)
+        and (box or not kind.needs_box)
+        and not (box and kind.needs_shape)
     )

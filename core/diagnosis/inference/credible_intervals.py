@@ -114,7 +114,10 @@ def intervals(posterior: Posterior, model: Model) -> list[dict[str, dict[str, An
     spread, setup, found = spread_of(posterior, model), posterior.problem.setup, []
     for effect, own in model.split(spread):
         entry: dict[str, dict[str, Any]] = {}
+        told = effect.reported(setup)
         for item, value, deviation in zip(effect.numbers(), effect.coordinates, own, strict=True):
+            if item.name not in told:
+                continue
             low, high = item.interval(value, CRITERIA.intervals.normal_quantile * deviation)
             entry[item.name] = {
                 "value": item.value(value),
@@ -122,7 +125,7 @@ def intervals(posterior: Posterior, model: Model) -> list[dict[str, dict[str, An
                 "low": low,
                 "high": high,
             }
-        for name, (reported, unit) in effect.reported(setup).items():
+        for name, (reported, unit) in told.items():
             entry.setdefault(name, {"value": reported, "unit": unit})
         found.append(entry | _derived_intervals(effect, own, setup))
     return found

@@ -59,7 +59,8 @@ SECOND_LAWS: Mapping[str, SecondLaw] = {
     "tool_friction": SecondLaw("the drag grows less than the pressure and has a limit"),
 }
 """By name of the effect. The radius and the pairing of touches have one law. So have the sizes of
-the block, whose form the nuisances change, and its modulus, which alone does not show."""
+the block, whose form the nuisances change, its modulus, which alone does not show, and the offset
+of a cast, which is random anyway."""
 
 
 def with_second_laws(scenario: Scenario, seed: int) -> Scenario:

@@ -42,13 +42,17 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
         "radius": "m",
         "stiffness_ratio": "1",
     },
+    "geometry_local": {"rms": "m"},
 }
 """The effects that the virtual bench can hide, with the unit of each parameter; names are those of
 the catalogue."""
 
-WEIGHED = tuple(name for name in HIDDEN if name not in ("young_modulus", "stiff_tube"))
+WEIGHED = tuple(
+    name for name in HIDDEN if name not in ("young_modulus", "stiff_tube", "geometry_local")
+)
 """The effects that suites draw from. They show in clouds alone; a block of any modulus takes the
-same shape. A tube is hidden where it is asked for, so that a seed draws what it always drew."""
+same shape. A tube and a cast's own form are hidden where they are asked for, so that a seed draws
+what it always drew."""
 
 QUICK = (
     "poisson_ratio",

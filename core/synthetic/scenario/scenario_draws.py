@@ -129,6 +129,7 @@ CLEAR: Mapping[str, Draw] = {
     "permanent_set": lambda rng: {"retained_fraction": between(rng, 0.12, 0.3, 3)},
     "tool_friction": lambda rng: {"friction_coefficient": between(rng, 0.3, 0.8, 3)},
     "stiff_tube": _tube,
+    "geometry_local": lambda rng: {"rms": between(rng, 0.35e-3, 0.6e-3, 6)},
 }
 """Draws of the parameters of a clear effect in a block, SI units."""
 
@@ -187,6 +188,7 @@ _SHRINKING = (
     "relaxed_fraction",
     "retained_fraction",
     "friction_coefficient",
+    "rms",
 )
 _GROWING = ("J_m", "stiffness_over_E")
 """Parameters that are neutral at infinity; the strength of the effect goes with their inverse."""

@@ -38,6 +38,8 @@ class Truth:
         disturbances: outside the catalogue of effects; the verdict is then unexplained.
         begun: by sequence, offset (x, y) of a block that was not put back, at the beginning [m].
         nuisances: faults of the bench; they leave the verdict alone.
+        cast: RMS offset of a free form's surface from the stated one, which leaves it alone too
+            [m].
     """
 
     effects: tuple[HiddenEffect, ...]
@@ -49,6 +51,7 @@ class Truth:
     disturbances: tuple[Disturbance, ...] = ()
     begun: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     nuisances: tuple[Nuisance, ...] = ()
+    cast: float = 0.0
 
     @property
     def verdict(self) -> str:
@@ -85,8 +88,10 @@ class Truth:
         """The entries of the disturbances and of the nuisances, where there are any."""
         entries = [_described(one.name, one.parameters, DISTURBANCES) for one in self.disturbances]
         nuisances = described(self.nuisances)
-        return ({"disturbances": entries} if entries else {}) | (
-            {"nuisances": nuisances} if nuisances else {}
+        return (
+            ({"disturbances": entries} if entries else {})
+            | ({"nuisances": nuisances} if nuisances else {})
+            | ({"cast_mm": round(1e3 * self.cast, 4)} if self.cast else {})
         )
 
     def save(self, path: Path) -> None:
@@ -118,6 +123,7 @@ def read_truth(folder: Path, scenario: Scenario) -> Truth:
         scenario.disturbances,
         {name: (1e-3 * x, 1e-3 * y) for name, (x, y) in data["began_off_mm"].items()},
         scenario.nuisances,
+        1e-3 * data.get("cast_mm", 0.0),
     )
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.app.reporting.report_plots import drawn_errors, error_plots
+from palpate.app.reporting.report_plots import drawn_errors, error_plots, field_map
 from palpate.app.storage.run_store import RecordedReplay
 
 
@@ -39,3 +39,13 @@ def test_panels_carry_name_and_split_and_nothing_is_drawn_of_nothing() -> None:
         [_replay("poke-top-01", 2e-4)], {"poke-top-01": "test"}
     )
     assert error_plots([], {}) == ""
+
+
+def test_map_of_a_cast_is_drawn_from_three_sides_with_its_scale() -> None:
+    rng = np.random.default_rng(0)
+    places, offset = rng.uniform(-0.03, 0.03, (60, 3)), rng.normal(size=60) * 3e-4
+    field = {"places": places.tolist(), "offset": offset.tolist()}
+    drawn = field_map({"effect": "geometry_local", "parameters": {}, "field": field})
+    assert all(text in drawn for text in ("from above", "from -y", "from +x", "cast over drawing"))
+    assert drawn.count("<use") >= 3 * 60
+    assert field_map({"effect": "gravity", "parameters": {}}) == ""

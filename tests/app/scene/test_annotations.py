@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from palpate.app.drawing import colours
 from palpate.app.drawing.figures import SurfaceFigure
 from palpate.app.scene.annotations import annotations_of, swept
 
@@ -61,3 +62,18 @@ def test_tube_of_a_report_is_drawn_inside_its_interval():
 @pytest.mark.parametrize("cause", [_cause(), _cause(polyline=[])], ids=["none", "empty"])
 def test_cause_without_a_line_is_not_drawn(cause):
     assert _annotations([cause]).inclusions == 0
+
+
+def test_offset_of_a_cast_is_drawn_as_beads_in_the_colours_of_its_sign():
+    places = [[0.0, 0.0, 0.02], [0.01, 0.0, 0.02], [0.02, 0.0, 0.02]]
+    field = {"places": places, "offset": [-3e-4, 0.0, 3e-4]}
+    parameters = {"rms": _interval(2.4e-4, 5e-5)}
+    cause = {"effect": "geometry_local", "parameters": parameters, "field": field}
+    found = _annotations([cause])
+    assert found.inclusions == 1
+    figures = found.lump_figures(Still(), 0, 1.0)
+    shades = [figure.colour for _, figure in sorted(figures.items())]
+    assert shades == [colours.SIGNED[band] for band in (0, 7, 14)]
+    middles = [figure.vertices.mean(axis=0) for _, figure in sorted(figures.items())]
+    np.testing.assert_allclose(middles, places, atol=2e-4)
+    assert _annotations([{**cause, "field": {"places": [], "offset": []}}]).inclusions == 0

@@ -21,6 +21,7 @@ from palpate.effects import (
     from_json,
 )
 from palpate.effects.elastic_material import StiffInclusion, YoungModulus, inclusion_grid
+from palpate.effects.geometry import GeometryLocal
 from palpate.effects.heterogeneity import Anisotropy
 from palpate.effects.plugins import checked
 from palpate.effects.sensor import CameraRegistration, TimeOffset
@@ -29,8 +30,11 @@ from palpate.foundation.errors import EffectError
 from palpate.measurement.camera_model import camera_model_for
 from palpate.measurement.touch_correction import touch_correction
 from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.protocol import Meshing
+from palpate.mesh.push_meshes import SCREEN_PUSHES
 from palpate.replay.replay import Equilibrium, replay
-from palpate.setup.setup import Box, Setup, Tool
+from palpate.setup.setup import Box, Setup, Tool, Touching
+from palpate.synthetic.bodies.shape_families import draw_shape
 
 SIZE = (0.0687, 0.0393, 0.0358)
 CORNERS = tuple(
@@ -43,6 +47,8 @@ SETUP = Setup(
     landmarks=CORNERS,
     phantom_from_camera=looking_at(np.array([-0.19, -0.16, 0.28]), np.array([0.0, 0.0, 0.018])),
 )
+FREE_FORM = replace(SETUP, geometry=draw_shape("dome", 3), landmarks=(), touching=Touching())
+"""For effects that no block can have."""
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
 POKE = np.array([[5e-3, 2e-3, 0.0358 + 5e-3 - depth] for depth in (1e-3, 3e-3, 5e-3)])
 RELEASE = np.concatenate([POKE, POKE[:1] + np.array([0.0, 0.0, 4e-3])])
@@ -77,6 +83,7 @@ VOCABULARY = {
         **{"aside": "m", "z": "m", "heading": "rad", "inclination": "rad"},
         **{"bend": "1/m", "sag": "1/m", "radius": "m", "stiffness_ratio": "1"},
     },
+    "geometry_local": {"rms": "m"},
 }
 
 # One finite size of each, for the tests that need a change.
@@ -108,12 +115,28 @@ EXAMPLES: dict[str, dict[str, float | str]] = {
         **{"aside": 2e-3, "z": 0.026, "heading": 0.4, "inclination": 0.1},
         **{"bend": 6.0, "sag": -3.0, "radius": 4e-3, "stiffness_ratio": 8.0},
     },
+    "geometry_local": GeometryLocal.of([6e-4, -3e-4]).values(),
 }
 EACH = pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 
 
 def _example(effect: type[Effect]) -> Effect:
     return from_json({"effect": effect.name, "parameters": EXAMPLES[effect.name]})
+
+
+def _stated(*effects: type[Effect]) -> Setup:
+    """A setup that can have these effects."""
+    return FREE_FORM if any(effect.needs_shape for effect in effects) else SETUP
+
+
+def _pushed(setup: Setup) -> tuple[np.ndarray, Meshing]:
+    """A push from above, and a mesh for it."""
+    if setup.geometry.is_block:
+        return POKE, GRID
+    top = np.array([[0.0, 0.0, setup.geometry.heights(np.zeros((1, 2)))[0]]])
+    return top + np.array([0.0, 0.0, 5e-3]) - np.outer([1e-3, 3e-3, 5e-3], [0.0, 0.0, 1.0]), (
+        SCREEN_PUSHES.at(top)
+    )
 
 
 def _setup_as_text(setup: Setup) -> str:
@@ -133,7 +156,9 @@ def test_catalogue_speaks_the_vocabulary():
 
 @EACH
 def test_report_states_the_parameters_by_name_and_unit(effect):
-    reported = {name: unit for name, (_, unit) in _example(effect).reported(SETUP).items()}
+    reported = {
+        name: unit for name, (_, unit) in _example(effect).reported(_stated(effect)).items()
+    }
     assert VOCABULARY[effect.name].items() <= reported.items()
 
 
@@ -207,18 +232,20 @@ def test_neutral_changes_nothing_in_a_replay(effect, baseline):
 @EACH
 def test_example_changes_replay_or_sensor(effect):
     side = np.array([[0.0343 + 5e-3 - depth, 0.0, 0.02] for depth in (2e-3, 6e-3)])  # slides a base
-    setup = _example(effect).apply(SETUP)
+    stated = _stated(effect)
+    setup = _example(effect).apply(stated)
     if effect.enters is Slot.SENSOR:
         assert _setup_as_text(replace(setup, sensor=SETUP.sensor)) == _setup_as_text(SETUP)
         assert _setup_as_text(setup) != _setup_as_text(SETUP)
         assert effect is TimeOffset or not camera_model_for(setup).same(camera_model_for(SETUP))
         return
-    way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.has_history else POKE
+    poke, grid = _pushed(stated)
+    way = side if effect.enters is Slot.SUPPORT else RELEASE if setup.material.has_history else poke
     found, without = (
-        replay(one, touch_correction(one, GRID).apply(way), GRID, times=TIMES[: len(way)])[-1]
-        for one in (setup, SETUP)
+        replay(one, touch_correction(one, grid).apply(way), grid, times=TIMES[: len(way)])[-1]
+        for one in (setup, stated)
     )
-    point = np.array([[3e-3, 1e-3, 0.0358]])
+    point = np.array([[3e-3, 1e-3, stated.geometry.height]])
     moved = np.linalg.norm(found.move(point * setup.scale) - without.move(point))
     if effect is YoungModulus:  # the shape is that of any other stiffness, and the force is not
         assert moved < 1e-9 and np.allclose(found.force, 2 * without.force, rtol=1e-9)
@@ -253,9 +280,10 @@ def test_value_out_of_bounds_is_an_error_that_names_everything(effect):
 
 @EACH
 def test_apply_leaves_the_setup_alone_and_repeats_itself(effect):
-    before = _setup_as_text(SETUP)
-    first, second = (_setup_as_text(_example(effect).apply(SETUP)) for _ in range(2))
-    assert _setup_as_text(SETUP) == before and first == second != before
+    stated = _stated(effect)
+    before = _setup_as_text(stated)
+    first, second = (_setup_as_text(_example(effect).apply(stated)) for _ in range(2))
+    assert _setup_as_text(stated) == before and first == second != before
 
 
 @EACH
@@ -263,20 +291,23 @@ def test_effect_composes_with_every_other(effect):
     for other in CATALOGUE:
         if other is effect:
             continue
-        both = _setup_as_text(_example(effect).apply(_example(other).apply(SETUP)))
-        turned = _setup_as_text(_example(other).apply(_example(effect).apply(SETUP)))
+        stated = _stated(effect, other)
+        both = _setup_as_text(_example(effect).apply(_example(other).apply(stated)))
+        turned = _setup_as_text(_example(other).apply(_example(effect).apply(stated)))
         assert both == turned
-        assert both not in (_setup_as_text(_example(one).apply(SETUP)) for one in (effect, other))
+        assert both not in (_setup_as_text(_example(one).apply(stated)) for one in (effect, other))
 
 
 @EACH
 def test_starts_lie_within_bounds_and_change_the_setup(effect):
-    starts = effect.starts(SETUP)
+    stated = _stated(effect)
+    starts = effect.starts(stated)
     assert starts
     for start in starts:
         assert from_json(start.to_json()) == start
     if effect not in (ToolOffset, CameraRegistration):  # these are linear enough to begin at zero
-        assert all(_setup_as_text(start.apply(SETUP)) != _setup_as_text(SETUP) for start in starts)
+        plain = _setup_as_text(stated)
+        assert all(_setup_as_text(start.apply(stated)) != plain for start in starts)
 
 
 @EACH
@@ -318,7 +349,8 @@ def test_small_step_from_the_end_of_what_a_search_reaches_gives_and_takes_nothin
             end = start.at(coordinates)
             beside = end.coordinates
             beside[number] += back * CRITERIA.derivatives.step * item.scale
-            assert _kinds(end.apply(SETUP)) == _kinds(end.at(beside).apply(SETUP)), item.name
+            changed = (one.apply(_stated(effect)) for one in (end, end.at(beside)))
+            assert len({_kinds(one) for one in changed}) == 1, item.name
 
 
 def test_unknown_effect_is_an_error_that_lists_the_known():

@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 from deforming import DEFORMING
 
+from palpate.diagnosis.forward.jacobian import JacobianColumns, JacobianRequest
 from palpate.effects import CATALOGUE, Slot, from_json
+from palpate.effects.geometry import GeometryLocal
 from palpate.effects.time_dependence import PermanentSet, Viscoelasticity
 from palpate.effects.tool import ToolFriction
 from palpate.foundation.errors import SetupError
 from palpate.gradients.displacement_changes import displacement_changes
 from palpate.gradients.force_changes import force_changes
 from palpate.mesh.box_mesh import GridSpec
+from palpate.mesh.push_meshes import SCREEN_PUSHES
 from palpate.replay.replay import Replay
 from palpate.setup.setup import Box, Load, Material, Setup, Support, Tool
+from palpate.synthetic.bodies.shape_families import draw_shape
 
 SETUP = Setup(geometry=Box(size=(0.0687, 0.0393, 0.0358)), tool=Tool(radius=5e-3), mass=0.104)
 GRID = GridSpec(nodes=(9, 7, 6), spacing=2e-3)
@@ -182,7 +186,40 @@ def test_grid_of_other_elements_has_no_gradient():
     assert caught.value.where["key"] == "element_size"
 
 
+DOME = draw_shape("dome", 3)
+TOP = np.array([[4e-3, 2e-3, float(DOME.heights(np.array([[4e-3, 2e-3]]))[0])]])
+
+
+def _cast(*coefficients: float) -> Setup:
+    return GeometryLocal.of(coefficients).apply(Setup(geometry=DOME, tool=Tool(radius=5e-3)))
+
+
+@pytest.mark.parametrize(
+    ("setup", "changed"),
+    [(_cast(), _cast(2e-6)), (_cast(4e-4, 3e-4), _cast(4.02e-4, 3e-4))],
+    ids=["from none", "from one"],
+)
+def test_sensitivity_to_the_cast_is_the_difference_of_two_solves(setup, changed):
+    grid = SCREEN_PUSHES.at(TOP)
+    block, other = Replay(setup, grid, tolerance=1e-10), Replay(changed, grid, tolerance=1e-10)
+    frame = None
+    for depth in (1e-3, 3e-3):
+        frame = block.step(TOP[0] + [0.0, 0.0, 5e-3 - depth], frame)
+    assert frame is not None
+    solved = other.step(frame.tool.centre, frame)
+    wanted = solved.displacement - frame.displacement
+    found = displacement_changes(block, frame, [(changed, np.zeros(3))])[0]
+    assert np.linalg.norm(wanted) > 1e-7
+    assert np.linalg.norm(found - wanted) < 0.03 * np.linalg.norm(wanted)
+    # A diagnosis takes the surface under the tool to be a tool that comes as much nearer.
+    request = JacobianRequest(setups=(changed,), steps=(2e-6,), pivot=np.zeros(3))
+    columns = JacobianColumns(block, request, forces=False)
+    quick = 2e-6 * columns.changes(frame, np.zeros((1, 3)))[6, :-1]
+    alike = (quick * wanted).sum() / (np.linalg.norm(quick) * np.linalg.norm(wanted))
+    assert alike > 0.9 and np.linalg.norm(quick) == pytest.approx(np.linalg.norm(wanted), rel=0.3)
+
+
 def test_every_effect_that_deforms_the_block_has_its_gradient_checked_or_turned_down():
     turned_down = {*(effect.name for effect in REMEMBERING), "mesh_resolution"}
-    checked = {*DEFORMING, *STILL, "geometry_scale", *turned_down}
+    checked = {*DEFORMING, *STILL, "geometry_scale", "geometry_local", *turned_down}
     assert {effect.name for effect in CATALOGUE if effect.enters is not Slot.SENSOR} == checked

@@ -125,7 +125,9 @@ class RestCloud:
             np.concatenate([self.centres, self.table])
         )
         gap = camera_model_for(setup, reference=True).place(rays)
-        gap[: len(self.centres)] -= rest(setup, grid).move(setup.surface().own(self.centres))
+        own = setup.surface().own(self.centres)
+        sags = setup.load.specific_weight_over_stiffness
+        gap[: len(self.centres)] -= rest(setup, grid).move(own) if sags else own
         return np.concatenate(
             [
                 np.einsum("ni,ni->n", gap[: len(self.centres)], self.normals),

@@ -119,7 +119,11 @@ def test_forces_alone_weigh_what_they_can_tell_and_clouds_all() -> None:
     organ = Setup(geometry=Shape(*organ_surface(4e-3)), tool=SETUP.tool)
     on_an_organ = applicable_effects(organ, clouds=False, forces=True)
     assert set(on_an_organ) == set(forces) and len(on_an_organ) == 12
-    assert applicable_effects(SETUP, clouds=True, forces=False) == DIAGNOSED
+    assert applicable_effects(SETUP, clouds=True, forces=False) == tuple(
+        kind for kind in DIAGNOSED if not kind.needs_shape
+    )
+    shaped = applicable_effects(organ, clouds=True, forces=False)
+    assert set(DIAGNOSED) - set(shaped) == {kind for kind in DIAGNOSED if kind.needs_box}
 
 
 def _bumps() -> FloatArray:

@@ -27,7 +27,7 @@ from palpate.synthetic.scenario.scenario_draws import draw_scenario
 
 SIZE = (0.07, 0.04, 0.036)
 HEIGHT = np.linspace(0.0, 1.0, 101)
-ONE_LAW = {"tool_radius", "landmark_mismatch", "geometry_scale", "young_modulus"}
+ONE_LAW = {"tool_radius", "landmark_mismatch", "geometry_scale", "young_modulus", "geometry_local"}
 
 
 def _second(effect: str, **parameters: float | str) -> HiddenEffect:
