@@ -159,7 +159,7 @@ def test_suite_on_shapes_prints_how_far_lumps_and_tubes_were_found(
         "clear",
         "stiff_inclusion",
         "found",
-        [cause("stiff_inclusion", **dict.fromkeys("xyz", (0.002, 0.001, 0.003)))],
+        [cause("stiff_inclusion", 0.99, **dict.fromkeys("xyz", (0.002, 0.001, 0.003)))],
         truth={"x": 0.0, "y": 0.0, "z": 2e-3},
     )
     tube = result("clear", "stiff_tube", "found", [{**cause("stiff_tube"), "polyline": line[:1]}])

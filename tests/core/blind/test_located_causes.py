@@ -39,7 +39,9 @@ def lump(found: tuple[float, float, float] | None, name: str) -> CaseResult:
     """An inclusion at (0, 0, 20 mm) that was found there, or not at all."""
     causes = [
         cause(
-            "stiff_inclusion", **{axis: (at, at, at) for axis, at in zip("xyz", where, strict=True)}
+            "stiff_inclusion",
+            0.99,
+            **{axis: (at, at, at) for axis, at in zip("xyz", where, strict=True)},
         )
         for where in ([found] if found else [])
     ]
