@@ -262,7 +262,7 @@ def size_of_points(points: FloatArray) -> float:
     sample = points[:: 1 + len(points) // SAMPLED]
     if len(points) < 2:
         return POINT_SIZES[1]
-    apart = cKDTree(points).query(sample, k=2)[0][:, 1]
+    apart = np.asarray(cKDTree(points).query(sample, k=2)[0])[:, 1]
     return float(np.clip(GAPLESS * np.median(apart), *POINT_SIZES))
 
 
