@@ -85,15 +85,11 @@ class FreeSurface:
         count = len(self.vertices)
         graph = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
         hole = connected_components(graph, directed=False)[1][edges[:, 0]]
-        _, hole = np.unique(hole, return_inverse=True)
-        middles = np.stack(
-            [
-                np.bincount(hole, self.vertices[edges].mean(axis=1)[:, axis]) / np.bincount(hole)
-                for axis in range(3)
-            ],
-            axis=1,
-        )
-        fans = np.column_stack([edges[:, 1], edges[:, 0], count + hole])
+        _, number = np.unique(hole, return_inverse=True)
+        ends = self.vertices[edges].mean(axis=1)
+        sums = np.stack([np.bincount(number, ends[:, axis]) for axis in range(3)], axis=1)
+        middles = sums / np.bincount(number)[:, None]
+        fans = np.column_stack([edges[:, 1], edges[:, 0], count + number])
         return np.concatenate([self.vertices, middles]), np.concatenate([self.faces, fans])
 
     @cached_property

@@ -112,7 +112,7 @@ def _beyond_surface(centres: FloatArray, vertices: FloatArray, faces: IntArray) 
     a, b, c = corners[number].transpose(1, 0, 2)
     behind = np.einsum("fi,fi->f", centres - places, np.cross(b - a, c - a)) < 0
     distance = np.linalg.norm(centres - places, axis=1)
-    return np.where(behind, -distance, distance)
+    return np.asarray(np.where(behind, -distance, distance))
 
 
 def touching(depth: FloatArray) -> list[list[int]]:

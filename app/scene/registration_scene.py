@@ -249,10 +249,12 @@ def by_height(heights: FloatArray) -> Any:
     """Colours (n, 3) of points by their heights (n,) [m], the lowest dark: on a smooth body nothing
     else shows in which place a point lies.
     """
-    low, high = np.percentile(heights, [2, 98]) if len(heights) else (0.0, 1.0)
-    share = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)[:, None]
-    bright = SHADES[0] + share * (SHADES[1] - SHADES[0])
-    return np.clip(bright * np.array(colours.MEASURED), 0, 255).astype(np.uint8)
+    if not len(heights):
+        return np.zeros((0, 3), dtype=np.uint8)
+    low, high = (float(end) for end in np.percentile(heights, [2, 98]))
+    share = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
+    bright = np.asarray(SHADES[0] + share * (SHADES[1] - SHADES[0]))
+    return np.clip(np.outer(bright, colours.MEASURED), 0, 255).astype(np.uint8)
 
 
 def size_of_points(points: FloatArray) -> float:
@@ -260,7 +262,7 @@ def size_of_points(points: FloatArray) -> float:
     sample = points[:: 1 + len(points) // SAMPLED]
     if len(points) < 2:
         return POINT_SIZES[1]
-    apart = cKDTree(points).query(sample, k=2)[0][:, 1]
+    apart = np.asarray(cKDTree(points).query(sample, k=2)[0])[:, 1]
     return float(np.clip(GAPLESS * np.median(apart), *POINT_SIZES))
 
 

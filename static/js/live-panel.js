@@ -53,6 +53,9 @@ export function start() {
     if (state().live && answer) send();
   });
   subscribe(["live"], drawBar);
+  subscribe(["series"], () => {
+    if (state().live) draw();
+  });
   subscribe(["run", "sequence"], () => {
     if (openedPanel() === "live") {
       leave();
@@ -375,7 +378,8 @@ function draw() {
       ),
     ),
     element("div", { id: "live-answer", "aria-live": "polite" }),
-    element("div", { class: "live-pad" }, toolPad(), depthSlider()),
+    // The body from above comes with the series of the sequence, which may arrive later.
+    element("div", { class: "live-pad" }, state().series ? [toolPad(), depthSlider()] : null),
     element(
       "div",
       { class: "actions" },
@@ -465,7 +469,7 @@ function depthSlider() {
   return element(
     "label",
     { class: "live-depth" },
-    "Below the surface",
+    "Below surface",
     element("input", {
       type: "range",
       id: "live-depth",
