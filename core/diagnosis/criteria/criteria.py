@@ -14,7 +14,6 @@ from palpate.diagnosis.criteria.forward_criteria import (
     ReplayCriteria,
 )
 from palpate.diagnosis.criteria.inference_criteria import (
-    CameraErrorCriteria,
     FitCriteria,
     IntervalCriteria,
     NoiseCriteria,
@@ -23,6 +22,7 @@ from palpate.diagnosis.criteria.inference_criteria import (
     StructureCriteria,
 )
 from palpate.diagnosis.criteria.observation_criteria import (
+    CameraErrorCriteria,
     ForceErrorCriteria,
     ForceOnlyCriteria,
     GroupingCriteria,

@@ -9,7 +9,6 @@ import numpy as np
 from palpate.diagnosis.criteria.threshold import threshold
 
 __all__ = [
-    "CameraErrorCriteria",
     "FitCriteria",
     "IntervalCriteria",
     "NoiseCriteria",
@@ -17,11 +16,6 @@ __all__ = [
     "RestCriteria",
     "StructureCriteria",
 ]
-
-
-def _millimetres(*values: float) -> tuple[float, ...]:
-    """Metres of these millimetres."""
-    return tuple(value * 1e-3 for value in values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,52 +134,6 @@ class NoiseCriteria:
     )
     least_freedom: int = threshold(
         50, "1", "A patch with no more degrees of freedom than this gets the median variance."
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class CameraErrorCriteria:
-    """The camera's error in the rest cloud: smooth bias, white scatter, and rippled depth."""
-
-    bias_sizes: tuple[float, ...] = threshold(
-        _millimetres(0.15, 0.2, 0.3, 0.4, 0.6, 1.0),
-        "m",
-        "Standard deviations of the smooth bias that are tried.",
-    )
-    bias_lengths: tuple[float, ...] = threshold(
-        (0.01, 0.014, 0.02, 0.028, 0.04, 0.06),
-        "m",
-        "Correlation lengths of the smooth bias that are tried.",
-    )
-    scatter_factors: tuple[float, ...] = threshold(
-        (1.0, 1.5, 2.2), "1", "Factors on the scatter's variance that are tried."
-    )
-    ripple_sizes: tuple[float, ...] = threshold(
-        _millimetres(0.05, 0.1, 0.2, 0.4, 0.8),
-        "m",
-        "Standard deviations of a ripple of depth that are tried.",
-    )
-    ripple_lengths: tuple[float, ...] = threshold(
-        _millimetres(1.5, 2.5, 4.0, 6.0),
-        "m",
-        "Correlation lengths, along the distance from the camera, of a ripple that are tried.",
-    )
-    least_ripple_gain: float = threshold(
-        12.0,
-        "nat",
-        "Gain in restricted log likelihood from which on a ripple is reported.",
-        "measured: of the virtual bench's rest clouds 12 with rippled depth gain 32 to 111, 12 "
-        "with nothing wrong at most 2.2, 28 with another cause at most 2.8; of another solver's "
-        "five the best gains 0.7",
-    )
-    white_floor: float = threshold(
-        2e-5, "m", "Standard deviation of a patch's average that no number of points reduces."
-    )
-    first_smooth_length: int = threshold(
-        2,
-        "1",
-        "Ripples are tried beside a bias of at least this place in `bias_lengths`, because a "
-        "rougher bias imitates them.",
     )
 
 

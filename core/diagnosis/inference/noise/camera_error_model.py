@@ -74,21 +74,31 @@ class CameraErrors:
         bias: standard deviation of the smooth bias [m].
         reach: its correlation length [m].
         ripple: waves of depth, significant or not.
+        cast_gain: of a model in which the body has an offset, over one in which only the camera
+            errs [nats].
     """
 
     covariance: FloatArray
     bias: float
     reach: float
     ripple: Ripple
+    cast_gain: float = 0.0
 
 
 def camera_errors(
-    places: FloatArray, depth: FloatArray, white: FloatArray, residual: FloatArray, free: FloatArray
+    places: FloatArray,
+    depth: FloatArray,
+    white: FloatArray,
+    residual: FloatArray,
+    free: FloatArray,
+    form: FloatArray | None = None,
 ) -> CameraErrors:
     """Estimate the camera's errors by restricted maximum likelihood (Patterson and Thompson 1971).
 
-    Waves are part of the covariance only where they are significant. Raises LinAlgError where no
-    model is positive definite.
+    Waves are part of the covariance only where they are significant. An offset of the body looks
+    like an error of the camera, but the table has none: where a model with both is surely better,
+    the covariance is that of the camera's share. Raises LinAlgError where no model is positive
+    definite.
 
     Args:
         places: points (n, 3) [m].
@@ -96,12 +106,12 @@ def camera_errors(
         white: variance of the scatter there (n,) [m^2].
         residual: (n,) [m].
         free: columns (n, c) whose share of the residual is left out.
+        form: covariance (n, n) of an offset of the body [m^2]; None for a body that has none.
     """
     scale = np.linalg.norm(free, axis=0)
     basis, sizes, _ = np.linalg.svd(free[:, scale > 0] / scale[scale > 0], full_matrices=False)
     cloud = _Cloud(places, depth, white, residual, basis[:, sizes > 1e-6 * sizes[0]])
-    shapes = product(range(len(BIAS_REACHES)), range(len(BIAS_SIZES)), range(len(WHITE_FACTORS)))
-    plain = max(((cloud.likelihood(shape), shape) for shape in shapes), key=lambda one: one[0])
+    plain = _best(cloud)
     if not np.isfinite(plain[0]):
         raise np.linalg.LinAlgError("no model of the camera's errors is positive definite")
     value, waving = _climb(cloud)
@@ -110,9 +120,30 @@ def camera_errors(
         float(size), float(reach), value - plain[0], float(size**2 / (size**2 + bias**2))
     )
     best = waving if ripple.significant else plain[1]
-    return CameraErrors(
-        cloud.covariance(best), float(BIAS_SIZES[best[1]]), float(BIAS_REACHES[best[0]]), ripple
-    )
+    cast_gain = 0.0
+    if form is not None and not ripple.significant:
+        gain, beside = _best(cloud, form)
+        cast_gain = gain - plain[0]
+        best = beside if cast_gain > CRITERIA.camera_error.least_cast_gain else best
+    size, reach = float(BIAS_SIZES[best[1]]), float(BIAS_REACHES[best[0]])
+    return CameraErrors(cloud.covariance(best), size, reach, ripple, cast_gain)
+
+
+def _best(cloud: _Cloud, form: FloatArray | None = None) -> tuple[float, tuple[int, ...]]:
+    """Return likelihood [nats] and indices of the best model without waves.
+
+    Args:
+        cloud: to be explained.
+        form: covariance (n, n) of an offset of the body [m^2]; None without one.
+    """
+    shapes = product(range(len(BIAS_REACHES)), range(len(BIAS_SIZES)), range(len(WHITE_FACTORS)))
+    tried = [
+        (cloud.likelihood(shape) if form is None else cloud.value(cloud.covariance(shape) + form))
+        for shape in shapes
+    ]
+    place = int(np.argmax(tried))
+    shape = np.unravel_index(place, (len(BIAS_REACHES), len(BIAS_SIZES), len(WHITE_FACTORS)))
+    return float(tried[place]), tuple(int(index) for index in shape)
 
 
 def _climb(cloud: _Cloud) -> tuple[float, tuple[int, ...]]:
@@ -169,10 +200,14 @@ class _Cloud:
     def likelihood(self, model: tuple[int, ...]) -> float:
         """Return the restricted log likelihood of a model, up to a constant [nats]."""
         if model not in self._known:
-            factor = cho_factor(self.covariance(model))
-            solved = cho_solve(factor, np.column_stack([self._basis, self._residual]))
-            information, right = self._basis.T @ solved[:, :-1], self._basis.T @ solved[:, -1]
-            misfit = self._residual @ solved[:, -1] - right @ np.linalg.solve(information, right)
-            determinants = 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(information)[1]
-            self._known[model] = float(-0.5 * (misfit + determinants))
+            self._known[model] = self.value(self.covariance(model))
         return self._known[model]
+
+    def value(self, covariance: FloatArray) -> float:
+        """Return the restricted log likelihood of a covariance (n, n) [m^2], as `likelihood`."""
+        factor = cho_factor(covariance)
+        solved = cho_solve(factor, np.column_stack([self._basis, self._residual]))
+        information, right = self._basis.T @ solved[:, :-1], self._basis.T @ solved[:, -1]
+        misfit = self._residual @ solved[:, -1] - right @ np.linalg.solve(information, right)
+        determinants = 2 * np.log(np.diag(factor[0])).sum() + np.linalg.slogdet(information)[1]
+        return float(-0.5 * (misfit + determinants))

@@ -23,6 +23,7 @@ from palpate.measurement.surface_gaps import gaps
 from palpate.mesh.protocol import Meshing
 from palpate.registration.pose import motion_jacobian
 from palpate.replay.replay import rest
+from palpate.setup.free_form.cast_modes import CAST_MODES, cast_modes
 from palpate.setup.setup import Setup
 
 __all__ = ["RestCloud"]
@@ -82,7 +83,8 @@ class RestCloud:
         moved = np.einsum("ni,nij->nj", directions, motion_jacobian(places, pivot))
         free = np.column_stack([moved, _bulges(centres, surface.patch_sides[used], len(residual))])
         depth = sight.pose.inverse().apply(places)[:, 2]
-        errors = camera_errors(places, depth, white, residual, free)
+        form = _offset_covariance(setup, centres, len(residual))
+        errors = camera_errors(places, depth, white, residual, free, form)
         covariance = (
             errors.covariance
             + CRITERIA.rest.pose_freedom**2 * moved @ np.diag([1, 1, 1, 100, 100, 100]) @ moved.T
@@ -152,6 +154,22 @@ def _table_cells(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     spread = float(np.median(np.abs(table[:, 2] - means[index, 2]))) * 1.48 if len(table) else 0.0
     good = count >= CRITERIA.rest.least_table_points
     return means[good] * np.array([1.0, 1.0, 0.0]), means[good, 2], spread**2 / count[good]
+
+
+def _offset_covariance(setup: Setup, centres: FloatArray, rows: int) -> FloatArray | None:
+    """Return the covariance (rows, rows) [m^2] of a cast's offset at patches, which come first, and
+    table cells; None for a block.
+
+    Args:
+        setup: as stated.
+        centres: of the patches (p, 3) [m].
+        rows: number of patches and cells.
+    """
+    if setup.geometry.is_block:
+        return None
+    heights = np.zeros((rows, CAST_MODES))
+    heights[: len(centres)] = cast_modes(setup.stated_shape).at(centres)[0]
+    return np.asarray(CRITERIA.camera_error.cast_size**2 * heights @ heights.T)
 
 
 def _bulges(centres: FloatArray, sides: IntArray, rows: int) -> FloatArray:
