@@ -16,7 +16,8 @@ router = APIRouter(prefix="/effects", tags=["effects"])
 
 @router.get("")
 def listed() -> list[dict[str, Any]]:
-    """The catalogue of effects. Only replays and sweeps use those that are not `diagnosed`.
+    """The catalogue of effects. Only replays and sweeps use those that are not `diagnosed`; only a
+    diagnosis sets the numbers of those that are not `by_hand`.
 
     Bounds are SI, null where there is none. `scale` is a significant step: of the logarithm where
     `log`, of the contrast (k - 1) / (k + 3/2) where `contrast`.
@@ -30,6 +31,7 @@ def _described(effect: type[Effect]) -> dict[str, Any]:
         "enters": effect.enters.value,
         "summary": effect.summary,
         "diagnosed": effect in DIAGNOSED,
+        "by_hand": effect.by_hand,
         "parameters": [_parameter(item) for item in effect.parameters()],
     }
 

@@ -74,6 +74,8 @@ class Effect(ABC):
     """Whether only a box can have it, and no body of another shape."""
     needs_shape: ClassVar[bool] = False
     """Whether only a free form can have it, and no block."""
+    by_hand: ClassVar[bool] = True
+    """Whether each number means something alone, so that people set and sweep it."""
     kinked: ClassVar[bool] = False
     """Whether something begins or ends with its numbers, as a slide does: a fit then tries values
     to either side, and single pushes have no derivative by them."""

@@ -84,6 +84,7 @@ class GeometryLocal(Effect):
     name, enters = "geometry_local", Slot.GEOMETRY
     summary = "the cast differs from its drawing in places"
     linearisation, joint, needs_shape = Linearisation.TANGENT, True, True
+    by_hand = False
     mode_01: float = _mode()
     mode_02: float = _mode()
     mode_03: float = _mode()

@@ -73,18 +73,20 @@ async function loadEffects() {
  * @returns {SweepableParameter[]}
  */
 const sweepableParameters = () =>
-  effects.flatMap((effect) =>
-    effect.parameters
-      .filter(({ choices, low, high }) => !choices.length && low !== null && high !== null)
-      .map((item) => ({
-        ...item,
-        key: `${effect.name}.${item.name}`,
-        label:
-          effect.parameters.length > 1
-            ? `${capitalise(readableName(effect.name))}: ${readableName(item.name)}`
-            : capitalise(readableName(effect.name)),
-      })),
-  );
+  effects
+    .filter((effect) => effect.by_hand)
+    .flatMap((effect) =>
+      effect.parameters
+        .filter(({ choices, low, high }) => !choices.length && low !== null && high !== null)
+        .map((item) => ({
+          ...item,
+          key: `${effect.name}.${item.name}`,
+          label:
+            effect.parameters.length > 1
+              ? `${capitalise(readableName(effect.name))}: ${readableName(item.name)}`
+              : capitalise(readableName(effect.name)),
+        })),
+    );
 
 /**
  * @param {string} name

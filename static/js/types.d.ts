@@ -356,6 +356,7 @@ export interface Parameter {
 export interface Effect {
   name: string;
   summary: string;
+  by_hand: boolean;
   parameters: Parameter[];
 }
 

@@ -224,8 +224,10 @@ function draw() {
   const changed = JSON.stringify(rows) !== JSON.stringify(diagnosedRows()) || !tuned;
   const initial = sequenceModel?.beginnings ?? [];
   const absent = (catalogue ?? []).filter(
-    ({ name }) =>
-      initial.some(({ effect }) => effect === name) && !rows.some(({ effect }) => effect === name),
+    ({ name, by_hand: byHand }) =>
+      byHand &&
+      initial.some(({ effect }) => effect === name) &&
+      !rows.some(({ effect }) => effect === name),
   );
   fill(
     box,
@@ -368,11 +370,12 @@ function causeCard(row) {
             "take away",
           ),
     ),
-    effect?.parameters.map((item) =>
-      item.choices.length
-        ? choiceField(row, item)
-        : sliderField(row, item, Number(initial?.parameters[item.name])),
-    ),
+    effect?.by_hand &&
+      effect.parameters.map((item) =>
+        item.choices.length
+          ? choiceField(row, item)
+          : sliderField(row, item, Number(initial?.parameters[item.name])),
+      ),
   );
 }
 

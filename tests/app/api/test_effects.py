@@ -11,6 +11,7 @@ def test_catalogue_is_served_with_units_and_bounds(client: httpx.Client) -> None
     assert [name for name, effect in effects.items() if effect["diagnosed"]] == [
         effect.name for effect in DIAGNOSED
     ]
+    assert [name for name, effect in effects.items() if not effect["by_hand"]] == ["geometry_local"]
     radius = effects["tool_radius"]["parameters"][0]
     assert (radius["name"], radius["unit"]) == ("radius", "m")
     assert 0 < radius["low"] < 0.005 < radius["high"]
