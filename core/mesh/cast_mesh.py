@@ -10,6 +10,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import cg
 
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import MeshError
 from palpate.mesh.tet_mesh import TetMesh, sides_of, stretched
 from palpate.setup.free_form.cast_modes import Coefficients, cast_modes
 from palpate.setup.free_form.shape import Shape
@@ -64,7 +65,13 @@ def _moved(mesh: TetMesh, shape: Shape, coefficients: Coefficients, scale: Float
         stiffness = _laplacian(mesh)[inside]
         matrix, right = stiffness[:, inside], -(stiffness[:, border] @ motion[border])
         for axis in range(3):
-            motion[inside, axis] = cg(matrix, right[:, axis], rtol=_SETTLED)[0]
+            motion[inside, axis], unsettled = cg(matrix, right[:, axis], rtol=_SETTLED)
+            if unsettled:
+                raise MeshError(
+                    f"{shape.name}: the inside did not follow the cast's surface within "
+                    f"{unsettled} steps; its tetrahedra are too flat",
+                    file=shape.name,
+                )
     return mesh.with_corners(mesh.corners + motion)
 
 
