@@ -11,8 +11,6 @@ from palpate.foundation.frames import Transform
 
 __all__ = ["with_places_in_file"]
 
-_DIGITS = 5
-
 
 def with_places_in_file(report: dict[str, Any]) -> dict[str, Any]:
     """Add `in_file_frame` to the causes and next probes that state a place; a report without
@@ -58,4 +56,5 @@ def _of_probe(probe: dict[str, Any], back: Transform) -> dict[str, Any]:
 
 
 def _plain(values: FloatArray) -> Any:
-    return np.round(values, _DIGITS).tolist()
+    """Return values as lists, with five digits after the point."""
+    return np.round(values, 5).tolist()
