@@ -55,7 +55,7 @@ def test_every_effect_is_drawn_sooner_or_later(among: tuple[str, ...]) -> None:
 
 
 STATED_OTHERWISE = {"camera_registration", "geometry_local"}
-"""Effects whose truth is not the parameters: a pose's vector, and coefficients of a cast's modes."""
+"""Effects whose truth is not the parameters: a pose, and a cast whose modes have coefficients."""
 
 
 @pytest.mark.parametrize("effect", [effect for effect in HIDDEN if effect not in STATED_OTHERWISE])
