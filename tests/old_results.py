@@ -20,8 +20,8 @@ OLD_PLACE = "/srv/palpate"
 VOLATILE = {"remaining", "used", "caches"}
 """Keys whose values depend on the moment of the question."""
 TIMES = {"started", "finished", "at"}
-BY_EFFECT = ".beginnings"
-"""End of the places of lists with an item for each effect."""
+NAMED_BY = {".beginnings": "effect", ".targets": "key"}
+"""End of the places of lists with an item for each effect or target, and the key of its name."""
 TOLERANCE = 1e-4
 """Relative difference of solved values [1]; solvers end within it on every processor."""
 
@@ -98,8 +98,8 @@ def differences(
 ) -> Iterator[str]:
     """Yield where an answer lacks or changes something of the old one.
 
-    More keys are no difference, nor effects that version 0.1 did not know. Strings with blanks are
-    prose, which may be worded anew.
+    More keys are no difference, nor effects and targets that version 0.1 did not know. Strings with
+    blanks are prose, which may be worded anew.
 
     Args:
         old: what version 0.1 answered.
@@ -119,9 +119,10 @@ def differences(
             else:
                 yield from differences(old[key], new[key], f"{place}.{key}", **more)
     elif isinstance(old, list) and isinstance(new, list):
-        if place.endswith(BY_EFFECT):
-            known = {item["effect"] for item in old}
-            new = [item for item in new if item["effect"] in known]
+        name = next((name for end, name in NAMED_BY.items() if place.endswith(end)), None)
+        if name is not None:
+            known = {item[name] for item in old}
+            new = [item for item in new if item[name] in known]
         if len(old) != len(new):
             yield f"{place}: {len(old)} items before, {len(new)} now"
         for number, (one, other) in enumerate(zip(old, new, strict=False)):
