@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate.app.drawing import colours
 from palpate.app.reporting.svg_figure import INK, to_svg
 from palpate.app.storage.run_store import RecordedReplay
 from palpate.foundation.figure import new_figure
@@ -16,6 +15,8 @@ from palpate.foundation.figure import new_figure
 __all__ = ["drawn_errors", "error_plots", "field_map"]
 
 _COLUMNS, _HEADROOM = 3, 1.06
+_LEAST_OFFSET = 1e-5
+"""Least end of the scale of a map [m]."""
 _VIEWS = (("from above", "x", "y", 1.0), ("from -y", "x", "z", -1.0), ("from +x", "y", "z", 1.0))
 """Views of a map: name, axis to the right, axis upwards, and sign of the way to the viewer along
 the third axis."""
@@ -66,11 +67,8 @@ def field_map(cause: dict[str, Any]) -> str:
     places = 1e3 * np.array(field.get("places") or np.zeros((0, 3)), dtype=float)
     if not len(places):
         return ""
-    from matplotlib.colors import ListedColormap
-
     offset = np.array(field["offset"], dtype=float)
-    end = 1e3 * colours.nice_limit(offset)
-    shades = ListedColormap(np.array(colours.SIGNED) / 255.0)
+    end = 1e3 * max(float(np.abs(offset).max()), _LEAST_OFFSET)
     drawn = new_figure(9.0, 2.6)
     panels = drawn.subplots(1, len(_VIEWS), squeeze=False).ravel()
     for axes, (view, right, up, sign) in zip(panels, _VIEWS, strict=True):
@@ -82,7 +80,7 @@ def field_map(cause: dict[str, Any]) -> str:
             places[order, first],
             places[order, second],
             c=1e3 * offset[order],
-            cmap=shades,
+            cmap="RdBu_r",
             vmin=-end,
             vmax=end,
             s=16,

@@ -32,7 +32,7 @@ def test_right_cause_lowers_the_error(folder: Path) -> None:
     assert thin < stated
 
 
-@pytest.mark.more
+@pytest.mark.slow  # other tests make whole diagnoses
 def test_cause_is_named_and_plotted(folder: Path) -> None:
     said = _run("04_name_the_cause.py", folder).splitlines()
     assert said[0] == "found" and said[1].startswith("tool_radius")
