@@ -2,8 +2,9 @@
 /** @import { Attributes, Child } from "./types.js" */
 
 /**
- * Create an element. Attributes named on... are event listeners, `style` is an object or text;
- * attributes that are false, null or undefined are left out, and so are such children.
+ * Create an element. Attributes named on... are event listeners, `style` is an object, as the
+ * page's security policy refuses text; attributes that are false, null or undefined are left out,
+ * and so are such children.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} name
  * @param {Attributes<HTMLElementTagNameMap[K]>} [attributes]
@@ -16,7 +17,7 @@ export function element(name, attributes = {}, ...children) {
     if (value === false || value === null || value === undefined) continue;
     if (key.startsWith("on"))
       node.addEventListener(key.slice(2), /** @type {EventListener} */ (value));
-    else if (key === "style" && typeof value === "object") Object.assign(node.style, value);
+    else if (key === "style") Object.assign(node.style, value);
     else node.setAttribute(key, value === true ? "" : String(value));
   }
   node.append(...flattened(children));

@@ -308,7 +308,7 @@ function palpationSummary(run, { depth, force, young_modulus: modulus }, causes)
     element("img", {
       src: `/api/runs/${encodeURIComponent(run)}/pictures/palpation.png`,
       alt: "The pushes from above with the footprint of what was found, and a cut through it",
-      style: "width: 100%; border-radius: 8px; background: #fff",
+      class: "report-picture",
     }),
     element(
       "table",

@@ -140,9 +140,11 @@ function showNote(text = null) {
     typeof text === "string"
       ? text
       : state().run
-        ? state().rendered
-          ? ""
-          : "Opening the scene …"
+        ? state().sequence
+          ? state().rendered
+            ? ""
+            : "Opening the scene …"
+          : "No sequence of this result has clouds: what was found stands in the report."
         : "Choose a diagnosis on the left, or start one from a dataset.";
   box.classList.toggle("gone", !message);
   if (message) box.textContent = message;

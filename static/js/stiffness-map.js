@@ -19,7 +19,7 @@ export function stiffnessMap({ id, stiffness }, { stiffness_map: found }) {
       element("img", {
         src: `/api/runs/${encodeURIComponent(id)}/pictures/stiffness.png`,
         alt: "Stiffness below the surface from three sides; grey where nothing is told",
-        style: "width: 100%; border-radius: 8px; background: #fff",
+        class: "report-picture",
       }),
     );
   return rows;

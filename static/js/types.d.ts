@@ -595,6 +595,7 @@ type EventOn<E extends Event, T> = Omit<E, "target" | "currentTarget"> & {
 /** Attributes and listeners of an element; false, null and undefined leave an attribute out. */
 export interface Attributes<T> {
   [name: string]: unknown;
+  style?: Record<string, string>;
   onclick?: (event: EventOn<MouseEvent, T>) => unknown;
   onchange?: (event: EventOn<Event, T>) => unknown;
   oninput?: (event: EventOn<Event, T>) => unknown;

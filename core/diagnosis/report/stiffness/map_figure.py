@@ -46,7 +46,7 @@ def draw_map(path: Path, body: Geometry, made: StiffnessMap) -> None:
         float(np.abs(shown[values.trusted]).max(initial=0.0)),
         CRITERIA.figures.least_stiffness_change,
     )
-    vertices, triangles = finely_divided(*body.closed_surface, made.cells.spacing / 2)
+    vertices, triangles = finely_divided(*body.closed_surface, made.cells.spacing / 6)
     nearest = KDTree(values.places).query(vertices[triangles].mean(axis=1))[1]
     figure = new_figure(12.6, 4.6)
     drawn: Any = None
@@ -89,8 +89,8 @@ def _view(
         1e3 * corners[order][:, :, list(flat)],
         array=np.ma.masked_invalid(values[order]),
         cmap=colormaps["RdBu_r"].with_extremes(bad=FAINT),
-        edgecolors="face",
-        linewidths=0.3,
+        linewidths=0.0,
+        antialiased=False,
     )
     drawn.set_clim(-limit, limit)
     axes.add_collection(drawn)
