@@ -34,6 +34,7 @@ class DatasetConfig:
             read.
         shape: statements about a mesh; None for a box.
         mass: of the phantom [kg].
+        height_sigma: standard deviation of the height over what is held [m]; None if not stated.
         fixed: support of the phantom, "base" unless `shape` states another one.
         young_modulus: believed [Pa].
         poisson_ratio: believed [1].
@@ -81,6 +82,7 @@ class DatasetConfig:
     train: tuple[str, ...]
     validation: tuple[str, ...]
     test: tuple[str, ...]
+    height_sigma: float | None = None
     phantom_from_robot: StatedPose | None = None
     phantom_from_file: Transform = field(default_factory=Transform)
 
@@ -133,8 +135,8 @@ def read_config(root: Path) -> DatasetConfig:
 
 
 def _phantom(keys: Keys) -> dict[str, Any]:
-    known = ("geometry", "size", "mass", "fixed", "young_modulus", "poisson_ratio", *SHAPE_KEYS)
-    keys.only(known)
+    common = ("geometry", "size", "mass", "height_sigma", "fixed", "young_modulus", "poisson_ratio")
+    keys.only((*common, *SHAPE_KEYS))
     geometry = _geometry(keys)
     shape = geometry["shape"]
     other = shape is not None and shape.held_by != "fixed"
@@ -145,6 +147,7 @@ def _phantom(keys: Keys) -> dict[str, Any]:
     return {
         **geometry,
         "mass": keys.number("mass", 1e-5, 50.0, "kg"),
+        "height_sigma": _sigma(keys, "height_sigma"),
         "fixed": shape.held_by if other else keys.choice("fixed", "base", why),
         "young_modulus": keys.number("young_modulus", 50.0, 1e9, "Pa", default=5.0e3),
         "poisson_ratio": keys.number("poisson_ratio", -0.5, 0.4999, "", default=0.45),
@@ -181,14 +184,18 @@ def _tool(keys: Keys) -> float:
 def _landmarks(keys: Keys) -> dict[str, Any]:
     ball = keys.values.get("touch_offset") == "ball"
     offset = 0.0 if ball else keys.number("touch_offset", -0.2, 0.2, "m", default=0.0)
-    sigma = keys.number("touch_sigma", 1e-6, 0.05, "m") if "touch_sigma" in keys.values else None
     names = [name for name in keys.values if name not in ("touch_offset", "touch_sigma")]
     return {
         "landmarks": {name: keys.vector(name, -2.0, 2.0) for name in names},
         "touch_offset": offset,
         "ball_touches": ball,
-        "touch_sigma": sigma,
+        "touch_sigma": _sigma(keys, "touch_sigma"),
     }
+
+
+def _sigma(keys: Keys, name: str) -> float | None:
+    """An optional standard deviation of a length [m]."""
+    return keys.number(name, 1e-6, 0.05, "m") if name in keys.values else None
 
 
 def _robot(keys: Keys) -> StatedPose | None:

@@ -42,6 +42,7 @@ class InferenceProblem:
         clouds: whether any sequence has clouds.
         pushes: places and outward normals (k, 3) of the pushes of sequences without clouds.
         contacts: the same of what the tool touches in any fitted sequence.
+        height_sigma: standard deviation of the stated height [m]; None if not stated.
         catalogue: effects to choose from.
     """
 
@@ -56,6 +57,7 @@ class InferenceProblem:
     clouds: bool = True
     pushes: tuple[FloatArray, FloatArray] = field(default_factory=_no_pushes)
     contacts: tuple[FloatArray, FloatArray] = field(default_factory=_no_pushes)
+    height_sigma: float | None = None
     catalogue: Sequence[type[Effect]] = CATALOGUE
 
     @cached_property

@@ -46,6 +46,7 @@ def problem_of_dataset(
         clouds=clouds,
         pushes=pushed_places(fitted, setup),
         contacts=(touched, setup.geometry.facing(touched)[1]),
+        height_sigma=experiment.dataset.config.height_sigma,
     )
 
 

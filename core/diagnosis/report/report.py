@@ -15,9 +15,10 @@ from palpate.dataset.check.plausibility import frame_notes, implausible_values
 from palpate.diagnosis.criteria import CRITERIA
 from palpate.diagnosis.gain.force_gain import ForceGain
 from palpate.diagnosis.gain.surface_gain import SurfaceGain
-from palpate.diagnosis.inference.credible_intervals import intervals, modulus_interval
+from palpate.diagnosis.inference.credible_intervals import intervals
 from palpate.diagnosis.inference.evaluate import Evaluator
 from palpate.diagnosis.inference.noise.mesh_discrepancy import too_coarse
+from palpate.diagnosis.report.identified_modulus import modulus_entries
 from palpate.diagnosis.report.model_probabilities import probabilities
 from palpate.diagnosis.report.remaining_error import small_remainder, unexplained_error
 from palpate.diagnosis.search.findings import Findings, Trial, shared_family
@@ -184,7 +185,7 @@ def report_of(
     trials = [*best, *findings.rivals()] if verdict == "ambiguous" else best
     causes = _causes(evaluator, findings, trials)
     named = {cause["effect"] for cause in causes}
-    known, unknown = _modulus(evaluator, findings, named)
+    known, unknown = modulus_entries(evaluator, findings, named)
     return {
         "format": 1,
         "dataset": dataset.name,
@@ -283,46 +284,3 @@ def _cut_short(evaluator: Evaluator, findings: Findings) -> list[str]:
         f"the fit of {name} ended at its budget of work, before its numbers had settled"
         for name in names
     ]
-
-
-def _modulus(
-    evaluator: Evaluator, findings: Findings, named: set[str]
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Young's modulus where it is no cause: its entry of `identified`, or of `not_identifiable`."""
-    kinds = evaluator.problem.effects_sharing(NuisanceBlock.YOUNG_MODULUS)
-    if not kinds or any(kind.name in named for kind in kinds):
-        return [], []
-    name = kinds[0].name
-    model = findings.best.model if findings.best else findings.baseline
-    interval = modulus_interval(evaluator, model)
-    if interval is None:
-        why = (
-            "the tool is driven by position and no force was measured: "
-            "a block of any stiffness takes the same shape"
-        )
-        return [], [
-            _unknown(
-                name,
-                why,
-                "the force on the tool (forces.csv), or a drop of known weight on the block",
-            )
-        ]
-    value, low, high = interval
-    if high > CRITERIA.verdict.most_modulus_ratio * value:
-        why = (
-            f"the measured forces leave anything between {low:.3g} and {high:.3g} Pa open: "
-            "they hardly stand out of their noise"
-        )
-        return [], [_unknown(name, why, "deeper pushes, or with a sensor of less noise")]
-    stated = evaluator.problem.setup.material.young_modulus
-    why = (
-        f"the measured forces fix it within {100 * (high / value - 1):.0f} %; "
-        f"{stated:.4g} Pa were stated"
-    )
-    parameters = {"E": {"value": value, "unit": "Pa", "low": low, "high": high}}
-    return [{"effect": name, "why": why, "stated": stated, "parameters": parameters}], []
-
-
-def _unknown(name: str, why: str, instead: str) -> dict[str, str]:
-    """Entry of `not_identifiable` for Young's modulus."""
-    return {"effect": name, "why": why, "measure_instead": instead}

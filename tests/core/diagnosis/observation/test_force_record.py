@@ -31,6 +31,7 @@ from palpate.diagnosis.observation.frame_groups import Group, Observations
 from palpate.diagnosis.report.report import report_of
 from palpate.diagnosis.search.findings import Findings
 from palpate.effects.elastic_material import StiffInclusion, YoungModulus
+from palpate.effects.geometry import GeometryScale
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 from palpate.mesh.graded_mesh import REPLAY_GRID
@@ -291,6 +292,31 @@ def test_report_has_the_modulus_that_the_forces_identify(evaluator, baseline, tm
     assert told["unit"] == "Pa" and told["low"] < told["value"] < told["high"]
     assert told["value"] == pytest.approx(TRUE, rel=0.1)
     assert "young_modulus" in {row["effect"] for row in report["ranking"]}
+
+
+def test_stated_accuracy_of_the_height_is_part_of_the_modulus_interval(
+    evaluator, baseline, tmp_path
+):
+    sigma = 3e-3
+    uncertain = Evaluator(replace(evaluator.problem, height_sigma=sigma), evaluator.workers)
+    uncertain.state = evaluator.state
+    dataset = open_dataset(write_valid_dataset(tmp_path / "small-block"))
+    found = [
+        report_of(dataset, one, Findings(baseline), None, "test") for one in (evaluator, uncertain)
+    ]
+    without, told = [report["identified"][0]["parameters"]["E"] for report in found]
+    assert "height is stated to 3.0\xa0mm" in found[1]["identified"][0]["why"]
+    spread = [np.log(one["high"] / one["low"]) / 2 / 1.96 for one in (without, told)]
+    # The same push into a block that is a little higher takes less force. Where the surface lies is
+    # known from the camera and the touches, so that the tool goes as deep.
+    higher = GeometryScale(scale_x=1.0, scale_y=1.0, scale_z=1.0 + sigma / SIZE[2]).apply(SETUP)
+    place = np.array([poke(2e-3)])
+    raised = place + np.array([0.0, 0.0, sigma])
+    (before,), (after,) = replay(SETUP, place, GRID), replay(higher, raised, GRID)
+    change = np.log(np.linalg.norm(before.force) / np.linalg.norm(after.force))
+    wider = np.sqrt(spread[1] ** 2 - spread[0] ** 2)
+    assert 0.5 * change < wider < 2.0 * change
+    assert without["low"] > told["low"] and without["high"] < told["high"]
 
 
 def test_another_modulus_gains_what_the_stated_one_costs(evaluator, baseline):
