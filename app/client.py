@@ -266,7 +266,12 @@ class Client:
         return dict(self._answer(self._http.post(f"/jobs/{identity}/retry")))
 
     def _get(self, path: str, **query: Any) -> Any:
-        return self._answer(self._http.get(path, params=query))
+        """Ask; a second time where the connection broke, as one does that was idle for too long."""
+        try:
+            answer = self._http.get(path, params=query)
+        except httpx.TransportError:
+            answer = self._http.get(path, params=query)
+        return self._answer(answer)
 
     def _ask(self, path: str, body: dict[str, Any], key: str | None) -> dict[str, Any]:
         """Request a job; repeat once where the connection broke, which the key makes harmless."""

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 from pydantic.config import JsonDict
 
+from palpate.app.http_errors import Missing
 from palpate.app.jobs.job_results import (
     cancel_job,
     job_of,
@@ -129,6 +130,36 @@ def points(
     begun = store.has_begun(identity)
     rows = store.points(identity)[after : after + most] if begun else []
     return {"points": rows, "next": after + len(rows), "job": job}
+
+
+@router.get("/{identity}/points/{number}/replay")
+def replay_of_point(identity: str, number: int, services: CurrentServices) -> dict[str, Any]:
+    """The body of a POST /api/replays that replays the swept sequences with the values of a point;
+    the other parameters of its effects are as stated, or as the sweep fixed them.
+    """
+    from palpate.registration.registration import unregistered_setup
+
+    store = SweepStore(services.settings.runs)
+    if not store.has_begun(identity):
+        raise store.missing(identity)
+    request = store.request(identity)
+    values = next(
+        (row["values"] for row in store.points(identity) if row["number"] == number), None
+    )
+    if values is None:
+        raise Missing(
+            f"sweep {identity} has no point {number}; GET its points for those it has",
+            sweep=identity,
+            number=number,
+        )
+    spec = SweepSpec.from_json(request)
+    setup = unregistered_setup(services.library.open(request["dataset"]))
+    return {
+        "dataset": request["dataset"],
+        "sequences": list(spec.sequences),
+        "effects": [one.to_json() for one in spec.space.effects(setup, values)],
+        "registration": request.get("registration"),
+    }
 
 
 @router.post("/{identity}/cancel")

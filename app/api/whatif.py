@@ -38,12 +38,15 @@ class LiveMessage(LiveRequest):
 def beginnings(name: str, sequence: str, services: CurrentServices) -> dict[str, Any]:
     """Starting points for changes: the effects of the model, and an instance of every effect of the
     catalogue with a finite size.
+
+    `impossible` has the effects that this setup cannot have, each with the reason; `spans` the
+    values (SI) between which numbers make sense in this phantom, such as places.
     """
     run = services.runs.get(name)
     run.replay(sequence)
     return {
         "model": run.model.get("effects", []),
-        "beginnings": services.frame_solver.beginnings(run, sequence),
+        **services.frame_solver.beginnings(run, sequence),
     }
 
 
@@ -75,6 +78,7 @@ def solve(
         "noise_floor": finite(replay["noise_floor"]),
         "converged": solution.converged,
         "outcome": solution.outcome,
+        "notes": list(solution.notes),
     }
 
 

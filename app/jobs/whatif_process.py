@@ -25,8 +25,10 @@ again when it is requested."""
 class FrameSolver(WarmProcess):
     """Solves frames of runs again, one at a time, in another process."""
 
-    def beginnings(self, run: Run, sequence: str) -> list[dict[str, Any]]:
-        """An instance of each effect with a finite size, as a starting point for changes."""
+    def beginnings(self, run: Run, sequence: str) -> dict[str, Any]:
+        """Choices by hand: `beginnings`, an instance of each effect with a finite size;
+        `impossible`, the other effects with the reason; and `spans` of numbers by effect.
+        """
         self.set_up(_open, *_key(run, sequence))
         return self.ask(_beginnings, *_key(run, sequence))
 
@@ -101,10 +103,15 @@ def _open(folder: str, sequence: str, clouds: tuple[int, ...], model: str) -> No
 
 def _beginnings(
     folder: str, sequence: str, clouds: tuple[int, ...], model: str
-) -> list[dict[str, Any]]:
+) -> dict[str, Any]:
     from palpate.recording.resolve_frame import open_resolver
 
-    return open_resolver(folder, sequence, clouds, model).beginnings()
+    resolver = open_resolver(folder, sequence, clouds, model)
+    return {
+        "beginnings": resolver.beginnings(),
+        "impossible": resolver.impossible(),
+        "spans": resolver.spans(),
+    }
 
 
 def _solve(

@@ -19,11 +19,12 @@ from palpate.effects.family import Family
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock, Tangent
 from palpate.effects.parameter import Parameter
 from palpate.foundation.errors import EffectError
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import AnyInclusion, Inclusion, Setup
 
 __all__ = ["MEASURE_SIZE", "Effect", "Slot", "with_effects"]
 
-MEASURE_SIZE = "measure the block with a calliper"
+MEASURE_SIZE = "measure the phantom with a calliper"
 """Measurement that tells the phantom's size from effects that look like it."""
 
 
@@ -136,6 +137,22 @@ class Effect(ABC):
     @abstractmethod
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with this effect in it."""
+
+    @classmethod
+    def impossible(cls, setup: Setup) -> str:
+        """Return why nothing in this setup can have the effect, as a clause; empty if it can."""
+        if cls.needs_box and not setup.geometry.is_block:
+            return "only a block can have it"
+        if cls.needs_shape and setup.geometry.is_block:
+            return "only a phantom whose surface is stated as a file can have it"
+        return ""
+
+    @classmethod
+    def spans(cls, body: Geometry) -> dict[str, tuple[float, float]]:
+        """Return lowest and highest value [SI] by name of numbers to which a body of this extent
+        sets narrower limits than their bounds, such as places; by default of none.
+        """
+        return {}
 
     # -- properties that a diagnosis reads --------------------------------------------------------
 
@@ -265,7 +282,7 @@ class Effect(ABC):
         Args:
             values: of the parameters and of what `reported` adds, SI. "depth" is a text with the
                 interval of a depth below the skin, where a report states one.
-            size: lengths (3,) of the block along x, y, z [m], where they are known.
+            size: extent (3,) of the phantom along x, y, z [m], where they are known.
         """
         return f"that {cls.summary}"
 

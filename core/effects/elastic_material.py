@@ -6,11 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
+import numpy as np
+
 from palpate.effects.base import Effect, Slot
 from palpate.effects.family import STIFFNESS
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Inclusion, Setup
 
 __all__ = [
@@ -30,19 +33,24 @@ contribute in equal parts, and so does the sensor's gain."""
 
 
 def inclusion_grid(setup: Setup) -> tuple[Inclusion, ...]:
-    """Return inclusions on a coarse grid of places in the block, five times as stiff as it."""
-    x, y, z = setup.geometry.size
-    return tuple(
-        Inclusion(
-            x=(i - 0.5 * 6) / 7 * x,
-            y=(j - 1) / 3 * y,
-            z=height * z,
-            radius=7e-3,
-            stiffness_ratio=5.0,
-        )
+    """Return inclusions on a coarse grid of places in the body, five times as stiff as it.
+
+    The grid spans the bounding box; of a free form, places outside the body are left out.
+    """
+    body = setup.geometry
+    x, y, z = body.size
+    middle_x, middle_y, _ = ((body.low + body.high) / 2).tolist()
+    grid = [
+        (middle_x + (i - 0.5 * 6) / 7 * x, middle_y + (j - 1) / 3 * y, height * z)
         for i in range(7)
         for j in range(3)
         for height in (0.45, 0.72)
+    ]
+    if not body.is_block:
+        inside = body.outside(np.array(grid)) < 0
+        grid = [place for place, kept in zip(grid, inside, strict=True) if kept] or grid
+    return tuple(
+        Inclusion(x=x, y=y, z=z, radius=7e-3, stiffness_ratio=5.0) for x, y, z in grid
     )
 
 
@@ -94,7 +102,15 @@ class StiffInclusion(Effect):
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
-        return cls(x=0.0, y=0.0, z=setup.geometry.size[2] / 2, radius=7e-3, stiffness_ratio=1.0)
+        body = setup.geometry
+        x, y, _ = ((body.low + body.high) / 2).tolist()
+        return cls(x=x, y=y, z=body.size[2] / 2, radius=7e-3, stiffness_ratio=1.0)
+
+    @classmethod
+    def spans(cls, body: Geometry) -> dict[str, tuple[float, float]]:
+        """Return the places within the bounding box."""
+        ends = zip(body.low.tolist(), body.high.tolist(), strict=True)
+        return dict(zip("xyz", ends, strict=True))
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:

@@ -16,6 +16,7 @@ from palpate.effects.linearisation import Linearisation, Measurement, Tangent
 from palpate.effects.parameter import parameter
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.quantities import quantity
+from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Fibres, Inclusion, Layer, Setup, Tube
 
 __all__ = ["Anisotropy", "StiffTube", "StiffnessGradient", "StrainStiffening", "SurfaceLayer"]
@@ -207,7 +208,7 @@ class Anisotropy(Effect):
         stiffer = f"{values['stiffness_ratio']:.2g} times as stiff along one direction as across"
         # A direction has no zero: two digits of 106.9 degrees are outside an interval of two.
         angle = math.degrees(values["direction"])
-        return f"fibres: the phantom is {stiffer}, {angle:.0f}° from its long side"
+        return f"fibres: the phantom is {stiffer}, {angle:.0f}° from the x axis"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,8 +252,14 @@ class StiffTube(Effect):
         )
 
     @classmethod
+    def spans(cls, body: Geometry) -> dict[str, tuple[float, float]]:
+        """Return the places within the bounding box."""
+        aside = math.hypot(*body.size[:2]) / 2
+        return {"aside": (-aside, aside), "z": (float(body.low[2]), float(body.high[2]))}
+
+    @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
-        """Return level tubes all over the block, five times as stiff as it."""
+        """Return level tubes all over the body, five times as stiff as it."""
         tubes = cls.screened(inclusion_grid(setup), setup)
         return [replace(tube, stiffness_ratio=5.0) for tube, _ in tubes]
 

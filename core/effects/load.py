@@ -19,13 +19,13 @@ class Gravity(Effect):
     """Sag under own weight, while the stated shape is the unloaded one."""
 
     name, enters = "gravity", Slot.LOAD
-    summary = "the block sags under its own weight"
+    summary = "the phantom sags under its own weight"
     # Measured: on the coarse mesh of the screening its pattern has a correlation of 0.89 with the
     # right one; the patterns of other effects have 0.99.
     needs_fine_mesh = True
     told_apart_by = MappingProxyType(
         {
-            "camera_registration": "record the untouched block again from another side, or turned "
+            "camera_registration": "record the untouched phantom again from another side, or turned "
             "on its side",
             "geometry_scale": MEASURE_SIZE,
         }

@@ -137,7 +137,7 @@ class DepthBias(Effect):
     told_apart_by = MappingProxyType(
         {
             "geometry_scale": MEASURE_SIZE,
-            "camera_registration": "record the untouched block from nearer and from farther away",
+            "camera_registration": "record the untouched phantom from nearer and from farther away",
         }
     )
     offset: float = parameter("m", low=-0.05, high=0.05, scale=2e-3, accuracy=3e-3)

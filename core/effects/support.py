@@ -11,11 +11,13 @@ from palpate.effects.family import BASE
 from palpate.effects.linearisation import Measurement
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
-from palpate.setup.setup import Detachment, Edge, Setup
+from palpate.setup.setup import Detachment, Edge, Setup, Shape
 
 __all__ = ["BaseCompliance", "BaseDetachment", "BaseSlip"]
 
 _EDGES = ("-x", "+x", "-y", "+y")
+_WIDEST = 0.04
+"""Width of a loose strip at most [m]."""
 _RIGID = 1e5
 """Stiffness of the springs under the base over E from which on the base counts as rigid [1/m]."""
 
@@ -65,7 +67,7 @@ class BaseDetachment(Effect):
     family = BASE
     summary = "a strip of the base is not held"
     edge: str = parameter("", choices=_EDGES)
-    extent: float = parameter("m", low=0.0, high=0.04, scale=2e-3, accuracy=7e-4)
+    extent: float = parameter("m", low=0.0, high=_WIDEST, scale=2e-3, accuracy=7e-4)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
@@ -74,9 +76,17 @@ class BaseDetachment(Effect):
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
         return [
-            cls(edge=edge, extent=0.35 * setup.geometry.size["xy".index(edge[1])])
+            cls(edge=edge, extent=min(0.35 * width, _WIDEST))
             for edge in _EDGES
+            for width in [setup.geometry.size["xy".index(edge[1])]]
         ]
+
+    @classmethod
+    def impossible(cls, setup: Setup) -> str:
+        body = setup.geometry
+        if isinstance(body, Shape) and not body.flat_base:
+            return "what holds the phantom is no flat base"
+        return super().impossible(setup)
 
     def apply(self, setup: Setup) -> Setup:
         if self.extent == 0:
@@ -88,13 +98,8 @@ class BaseDetachment(Effect):
 
     @classmethod
     def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
-        side = {
-            "-x": "the left short side",
-            "+x": "the right short side",
-            "-y": "the front side",
-            "+y": "the back side",
-        }[values["edge"]]
-        return f"that the base is loose {quantity(values['extent'], 'm')} inwards from {side}"
+        edge = f"its {str(values['edge']).replace('-', '−')} edge"
+        return f"that the base is loose {quantity(values['extent'], 'm')} inwards from {edge}"
 
 
 @dataclass(frozen=True, kw_only=True)

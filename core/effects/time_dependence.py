@@ -27,7 +27,7 @@ class Viscoelasticity(Effect):
     linearisation = Linearisation.HISTORY
     told_apart_by = MappingProxyType(
         {
-            "permanent_set": "let the block rest for several time constants after a release and "
+            "permanent_set": "let the phantom rest for several time constants after a release and "
             "record it"
         }
     )

@@ -191,6 +191,12 @@ class LandmarkMismatch(Effect):
         return True
 
     @classmethod
+    def impossible(cls, setup: Setup) -> str:
+        if setup.tracing is not None:
+            return "the robot was registered by traces, and no touch was paired with a landmark"
+        return super().impossible(setup)
+
+    @classmethod
     def neutral(cls, setup: Setup) -> Self:
         here = setup.touching
         return cls(pairing=here.pairing, scale=here.scale, inset=here.inset)

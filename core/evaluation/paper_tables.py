@@ -175,7 +175,7 @@ def interpret_search(coarse: Mapping[str, Any], fine: Mapping[str, Any]) -> str:
     change = "less than 0.001 mm" if most < 1e-3 else f"no more than {most:.1g} mm"
     return (
         f"Both searches are flat: from {COARSE[0]:.0f} to {COARSE[1]:.0f} Pa the mean distance "
-        f"changes by {change}. Driven by position and slowly, a homogeneous block takes the same "
+        f"changes by {change}. Driven by position and slowly, a homogeneous phantom takes the same "
         "shape whatever its stiffness: the modulus cancels, and clouds cannot determine it. Where "
         "a search like this finds a best modulus, the replay had not converged."
     )

@@ -78,7 +78,7 @@ def align_sequences(dataset: Dataset, registration: Registration) -> tuple[Datas
         return dataset, registration
     rows = ", ".join(f"{name} by {1e3 * np.linalg.norm(way):.1f} mm" for name, way in found.items())
     message = (
-        f"The block does not lie where rest.ply shows it as these begin: {rows}. It slid before, "
+        f"The phantom does not lie where rest.ply shows it as these begin: {rows}. It slid before, "
         "or was moved; each is compared from where it lay."
     )
     return shift_sequences(dataset, registration, found), replace(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -34,6 +34,8 @@ __all__ = ["FrameResolver", "ResolvedFrame", "open_resolver"]
 
 _TOLERANCE = 1e-3
 """Relative residual at which a frame counts as converged; that of the recording."""
+_SAMPLES = 50
+"""Points of an axis that are looked at, for each of those that state it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,7 @@ class ResolvedFrame:
         converged: whether this is an equilibrium.
         camera: (4, 4) phantom_from_camera.
         inside: interior fields as of a recording of one frame.
+        notes: doubts about the causes, one sentence each.
     """
 
     surface: FloatArray
@@ -61,6 +64,7 @@ class ResolvedFrame:
     converged: bool
     camera: FloatArray
     inside: InteriorFields
+    notes: tuple[str, ...] = ()
 
 
 class FrameResolver:
@@ -99,10 +103,19 @@ class FrameResolver:
         """One finite size of each effect of the catalogue, to start from by hand."""
         result = []
         for effect in DIAGNOSED:
-            possible = not (effect.needs_shape and self.stated.geometry.is_block)
-            if possible and (starts := effect.starts(self.stated)):
+            if not effect.impossible(self.stated) and (starts := effect.starts(self.stated)):
                 result.append(starts[len(starts) // 2].to_json())
         return result
+
+    def impossible(self) -> dict[str, str]:
+        """Names of the effects that this setup cannot have, each with the reason as a clause."""
+        reasons = {effect.name: effect.impossible(self.stated) for effect in DIAGNOSED}
+        return {name: reason for name, reason in reasons.items() if reason}
+
+    def spans(self) -> dict[str, dict[str, tuple[float, float]]]:
+        """Lowest and highest value [SI] of numbers that this body limits, by effect and name."""
+        body = self.stated.geometry
+        return {effect.name: found for effect in DIAGNOSED if (found := effect.spans(body))}
 
     def setup(self, effects: Sequence[Effect], tuned: bool = True) -> Setup:
         """The stated setup with these causes; `tuned` as in `solve`."""
@@ -142,6 +155,7 @@ class FrameResolver:
             not side.outcome[0],
             np.asarray(camera_model_for(setup).pose.matrix),
             side.inside,
+            tuple(_outside(setup)),
         )
 
     def _solved(self, setup: Setup, frame: int) -> Equilibrium:
@@ -169,6 +183,17 @@ class FrameResolver:
             )
             self._cleaned[frame, radius] = observed.clouds[0]
         return self._cleaned[frame, radius]
+
+
+def _outside(setup: Setup) -> Iterator[str]:
+    """Yield a sentence for each part of other stiffness that lies wholly outside the body."""
+    for part in setup.material.inclusions:
+        line = np.array(part.polyline)
+        ways = np.linspace(0.0, len(line) - 1.0, _SAMPLES * len(line))
+        along = np.column_stack([np.interp(ways, np.arange(len(line)), axis) for axis in line.T])
+        if setup.geometry.outside(along).min() > part.radius:
+            kind = "lump" if len(line) == 1 else "tube"
+            yield f"the {kind} lies outside the phantom, where it changes nothing"
 
 
 @lru_cache(maxsize=2)

@@ -35,7 +35,7 @@ from palpate.registration.settled_poses import settled_poses
 from palpate.registration.uncertainty import PRIOR
 from palpate.setup.setup import Material, Sensor, Setup, Tool, Touching, Tracing
 
-__all__ = ["Registration", "register", "setup_from"]
+__all__ = ["Registration", "register", "setup_from", "unregistered_setup"]
 
 _WEAK = 1.0e-3
 """Standard deviation of the robot's pose beyond which a warning is given [m]."""
@@ -147,25 +147,32 @@ def register(dataset: Dataset, report: Report = silent) -> Registration:
     )
 
 
+def unregistered_setup(dataset: Dataset) -> Setup:
+    """The setup that the experimenter believes in without poses: phantom, tool and landmarks."""
+    config = dataset.config
+    return Setup(
+        geometry=dataset.geometry,
+        tool=Tool(radius=config.tool_radius),
+        material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
+        sensor=Sensor(depth_sigma=config.depth_sigma, edge=config.edge),
+        mass=config.mass,
+        landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
+    )
+
+
 def setup_from(dataset: Dataset, registration: Registration) -> Setup:
     """The setup that the experimenter believes in, with the registrations and their touches."""
-    config = dataset.config
+    config, stated = dataset.config, unregistered_setup(dataset)
     touched = [np.asarray(config.landmarks[name]) for name in dataset.touches.names]
     lifts = [touched_centres(dataset)[name] for name in dataset.touches.names]
     radius = config.tool_radius
     normals = (np.array(lifts) - touched) / radius if config.ball_touches and touched else ()
     traced = np.zeros((0, 3)) if registration.robot is None else registration.robot.traced
-    return Setup(
-        geometry=dataset.geometry,
-        tool=Tool(radius=config.tool_radius),
-        material=Material(young_modulus=config.young_modulus, poisson_ratio=config.poisson_ratio),
-        sensor=Sensor(
-            depth_sigma=config.depth_sigma,
-            edge=config.edge,
-            view=() if registration.camera is None else registration.camera.view,
+    return replace(
+        stated,
+        sensor=replace(
+            stated.sensor, view=() if registration.camera is None else registration.camera.view
         ),
-        mass=config.mass,
-        landmarks=tuple(config.landmarks[name] for name in dataset.touches.names),
         touching=Touching(
             misses=_rows(registration.touch_residuals),
             lift=radius if config.ball_touches else config.touch_offset,

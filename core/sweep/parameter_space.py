@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from palpate.effects import Effect, Parameter, effect_named
+from palpate.effects.base import with_effects
 from palpate.foundation.errors import EffectError, PalpateError
 from palpate.setup.setup import Setup
 
@@ -130,10 +131,15 @@ class ParameterSpace:
 
         Parameters of an effect that are not named keep the values of the setup.
         """
+        return with_effects(stated, self.effects(stated, values))
+
+    def effects(self, stated: Setup, values: Values) -> list[Effect]:
+        """Return the effects that make the stated setup that of these parameter values."""
         by_effect: dict[str, dict[str, Any]] = {}
         for name, value in {**self.fixed, **values}.items():
             cause, _, key = name.partition(".")
             by_effect.setdefault(cause, {})[key] = value
-        for cause, parameters in by_effect.items():
-            stated = replace(effect_named(cause).neutral(stated), **parameters).apply(stated)
-        return stated
+        return [
+            replace(effect_named(cause).neutral(stated), **parameters)
+            for cause, parameters in by_effect.items()
+        ]

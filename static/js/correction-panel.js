@@ -429,7 +429,7 @@ async function drawOne(mine) {
           element(
             "p",
             { class: "gain-note" },
-            "Of the moving part, which leaves out what is as wrong in the untouched block, " +
+            "Of the moving part, which leaves out what is as wrong in the untouched phantom, " +
               "the file on disk has the same shares, and the paper's mean distance.",
           ),
         ]

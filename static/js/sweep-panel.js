@@ -2,16 +2,26 @@
 // parameter.
 import { errorCard, errorTitle, get, post, toast } from "./api.js";
 import { changedDataNote, element, fill, icon } from "./dom.js";
-import { capitalise, readableName, UNITS } from "./format.js";
+import { readableName } from "./format.js";
 import { addResultOpener } from "./jobs.js";
 import { addPanel, openPanel } from "./panels.js";
 import { cameraSelect } from "./register.js";
+import { state } from "./store.js";
+import {
+  heldFields,
+  heldValues,
+  loadEffects,
+  parameterLabel,
+  parameterOf,
+  sweepableParameters,
+  unitOf,
+  wholeRange,
+} from "./sweep-parameters.js";
 import { formatErrorChange, formatError, sweepPlot } from "./sweep-plots.js";
 
 /**
  * @import {
- *   DatasetSummary, Effect, Job, Parameter, PlotAxis, Sweep, SweepBounds, SweepDirection,
- *   SweepPoint
+ *   DatasetSummary, Job, PlotAxis, Sweep, SweepBounds, SweepDirection, SweepPoint
  * } from "./types.js"
  */
 
@@ -22,14 +32,14 @@ const METHODS = [
   ["tpe", "TPE"],
   ["cmaes", "CMA-ES"],
 ];
-const SHOWN_UNITS = ["m", "Pa", "s"]; // SI units that the form converts
 const PAUSE = 700; // between requests for new points [ms]
 /** @typedef {{ error: number, number: number, values: Record<string, number> }} BestPoint */
-/** @typedef {Parameter & { key: string, label: string }} SweepableParameter */
-/** @type {Effect[]} */
-let effects = [];
 /** @type {SweepBounds[]} */
 let axes = []; // of the form
+/** @type {Record<string, number | string>} */
+let held = {}; // values [SI] set by hand of parameters that are not swept
+/** @type {number | null} */
+let chosen = null; // number of the point that was clicked; null for the best
 /** @type {HTMLElement} */
 let box;
 /** @type {string | null} */
@@ -55,54 +65,13 @@ export function startSweeps() {
 /** Show the form. */
 async function openForm() {
   try {
-    const [{ datasets, folder }] = await Promise.all([get("/datasets"), loadEffects()]);
+    const { datasets, folder } = await get("/datasets");
     if (!axes.length) axes = [{ name: "poisson_ratio.nu", low: 0.3, high: 0.49 }];
     await showForm(datasets, folder);
   } catch (problem) {
     fill(box, errorCard(problem));
   }
 }
-
-/** Load the catalogue of effects, which has the parameters' units. */
-async function loadEffects() {
-  if (!effects.length) effects = await get("/effects");
-}
-
-/**
- * Return the numeric parameters with bounds, with the names that the API and the form use.
- * @returns {SweepableParameter[]}
- */
-const sweepableParameters = () =>
-  effects
-    .filter((effect) => effect.by_hand)
-    .flatMap((effect) =>
-      effect.parameters
-        .filter(({ choices, low, high }) => !choices.length && low !== null && high !== null)
-        .map((item) => ({
-          ...item,
-          key: `${effect.name}.${item.name}`,
-          label:
-            effect.parameters.length > 1
-              ? `${capitalise(readableName(effect.name))}: ${readableName(item.name)}`
-              : capitalise(readableName(effect.name)),
-        })),
-    );
-
-/**
- * @param {string} name
- * @returns {SweepableParameter | undefined}
- */
-const parameterOf = (name) => sweepableParameters().find(({ key }) => key === name);
-
-/**
- * Return the factor from SI units to the unit of the form, and that unit.
- * @param {string} name
- * @returns {[number, string]}
- */
-const unitOf = (name) => {
-  const { unit = "" } = parameterOf(name) ?? {};
-  return SHOWN_UNITS.includes(unit) ? UNITS[unit] : [1, unit === "1" ? "" : unit];
-};
 
 /**
  * @param {string[]} datasets
@@ -152,6 +121,9 @@ async function showForm(datasets, folder) {
     "dataset",
     datasets.map((name) => /** @type {[string, string]} */ ([name, name])),
   );
+  const current = state().heading?.folder;
+  if (current && datasets.includes(current)) dataset.value = current;
+  await loadEffects(dataset.value);
   const sequences = element("select", {
     name: "sequences",
     multiple: true,
@@ -160,15 +132,20 @@ async function showForm(datasets, folder) {
   });
   const cameras = element("div");
   const listCameras = async () => {
-    const choice = await cameraSelect(dataset.value);
+    const name = dataset.value;
+    const choice = await cameraSelect(name);
+    if (dataset.value !== name) return;
     fill(cameras, choice.hidden ? null : element("label", {}, "Camera", choice));
   };
   dataset.addEventListener("change", listCameras);
   const listSequences = async () => {
+    const shown = dataset.value;
+    fill(sequences);
     /** @type {Pick<DatasetSummary, "sequences">} */
-    const summary = await get(`/datasets/${encodeURIComponent(dataset.value)}`).catch(() => ({
+    const summary = await get(`/datasets/${encodeURIComponent(shown)}`).catch(() => ({
       sequences: [],
     }));
+    if (dataset.value !== shown) return;
     fill(
       sequences,
       summary.sequences
@@ -194,9 +171,27 @@ async function showForm(datasets, folder) {
     fill(
       rows,
       axes.map((axis) => axisRow(axis, drawRows)),
+      heldFields(axes, held),
     );
   };
   drawRows();
+  dataset.addEventListener("change", async () => {
+    const name = dataset.value;
+    start.disabled = true;
+    fill(rows, element("p", { class: "muted" }, "Reading the phantom …"));
+    await loadEffects(name).catch(toast);
+    if (dataset.value !== name) return;
+    start.disabled = false;
+    // Places in another phantom are none in this one.
+    held = {};
+    axes = axes.flatMap((axis) => {
+      const item = parameterOf(axis.name);
+      if (item?.impossible) return [];
+      return item?.span ? [wholeRange(item)] : [axis];
+    });
+    if (!axes.length) axes = [{ name: "poisson_ratio.nu", low: 0.3, high: 0.49 }];
+    drawRows();
+  });
   const start = element("button", { class: "button strong", type: "submit" }, "Start the sweep");
   const form = element(
     "form",
@@ -210,6 +205,7 @@ async function showForm(datasets, folder) {
           dataset: dataset.value,
           registration: values.get("registration") || null,
           parameters: axes.map(({ name, low, high }) => ({ parameter: name, low, high })),
+          fixed: heldValues(axes, held),
           method: method.value,
           measure: values.get("measure"),
           frames: Number(values.get("frames")),
@@ -239,7 +235,7 @@ async function showForm(datasets, folder) {
         type: "button",
         onclick: () => {
           const next = sweepableParameters().find(
-            ({ key }) => !axes.some(({ name }) => name === key),
+            ({ key, impossible }) => !impossible && !axes.some(({ name }) => name === key),
           );
           if (next) axes.push(wholeRange(next));
           drawRows();
@@ -325,8 +321,12 @@ function axisRow(axis, redraw) {
   const choice = element(
     "select",
     { "aria-label": "Parameter" },
-    sweepableParameters().map(({ key, label }) =>
-      element("option", { value: key, selected: key === axis.name }, label),
+    sweepableParameters().map(({ key, label, impossible }) =>
+      element(
+        "option",
+        { value: key, selected: key === axis.name, disabled: Boolean(impossible) },
+        impossible ? `${label} – ${impossible}` : label,
+      ),
     ),
   );
   choice.addEventListener("change", () => {
@@ -363,10 +363,11 @@ function axisRow(axis, redraw) {
  */
 async function followSweep(id) {
   followedId = id;
+  chosen = null;
   /** @type {SweepPoint[]} */
   let points = [];
   let next = 0;
-  const stop = stopButton(id);
+  const [stop, replay] = [stopButton(id), replayButton(id)];
   while (followedId === id) {
     try {
       /** @type {[Sweep, { points: SweepPoint[], next: number }, void]} */
@@ -379,7 +380,8 @@ async function followSweep(id) {
       points = points.concat(more.points);
       next = more.next;
       const byNumber = new Map(points.map((point) => [point.number, point]));
-      draw(sweep, [...byNumber.values()], stop);
+      const drawn = () => draw(sweep, [...byNumber.values()], stop, replay, drawn);
+      drawn();
       const ended = !sweep.job || !["queued", "running"].includes(sweep.job.state);
       if (ended && !more.points.length) return;
     } catch (problem) {
@@ -433,11 +435,62 @@ function stopButton(id) {
 }
 
 /**
+ * Create the button that replays the swept sequences with the values of the chosen point.
+ * @param {string} id
+ * @returns {HTMLButtonElement}
+ */
+function replayButton(id) {
+  const button = element(
+    "button",
+    {
+      class: "button",
+      type: "button",
+      title: "The swept sequences, every frame, with the values of this point, as a job",
+      onclick: async () => {
+        button.disabled = true;
+        try {
+          await post("/replays", await get(`/sweeps/${id}/points/${button.value}/replay`));
+          openPanel("jobs");
+        } catch (problem) {
+          toast(problem);
+        }
+        button.disabled = false;
+      },
+    },
+    "Replay this point",
+  );
+  return button;
+}
+
+/**
+ * Create the line that names the chosen point, or the best, with the button that replays it.
+ * @param {SweepPoint | null} point
+ * @param {PlotAxis[]} drawn
+ * @param {HTMLButtonElement} replay
+ * @returns {HTMLElement | null}
+ */
+function chosenPoint(point, drawn, replay) {
+  if (!point) return null;
+  replay.value = String(point.number);
+  const where = drawn
+    .map(({ name, label }) => `${label} ${formatValue(name, point.values[name])}`)
+    .join(", ");
+  return element(
+    "div",
+    { class: "sweep-point", "data-chosen": point.number },
+    element("span", {}, `${where}: ${point.error === null ? "failed" : formatError(point.error)}`),
+    replay,
+  );
+}
+
+/**
  * @param {Sweep} sweep
  * @param {SweepPoint[]} points
  * @param {HTMLElement} stop button that stays the same from call to call, so that it can be pressed
+ * @param {HTMLButtonElement} replay likewise
+ * @param {() => void} again draws the same with another chosen point
  */
-function draw(sweep, points, stop) {
+function draw(sweep, points, stop, replay, again) {
   const { id, job, request, summary } = sweep;
   const running = job && ["queued", "running"].includes(job.state) ? job : null;
   const swept = points.filter(({ kind }) => kind !== "stated");
@@ -494,7 +547,14 @@ function draw(sweep, points, stop) {
     swept.length
       ? element(
           "section",
-          {},
+          {
+            onclick: (event) => {
+              const point = event.target.closest("[data-point]")?.getAttribute("data-point");
+              if (!point) return;
+              chosen = Number(point);
+              again();
+            },
+          },
           sweepPlot(drawn, swept, stated, best?.number),
           element(
             "div",
@@ -512,7 +572,14 @@ function draw(sweep, points, stop) {
             failed.length
               ? element("span", { "data-failures": failed.length }, `✕ ${failed.length} failed`)
               : null,
+            element("span", {}, "click on a point to choose it"),
           ),
+          chosenPoint(
+            swept.find(({ number }) => number === (chosen ?? best?.number)) ?? null,
+            drawn,
+            replay,
+          ),
+          heldNote(request?.fixed ?? {}),
         )
       : null,
     summary?.directions.length
@@ -548,6 +615,19 @@ function formatValue(name, value) {
 }
 
 /**
+ * Say at what the other parameters were held; null where none was.
+ * @param {Record<string, number | string>} fixed [SI]
+ * @returns {HTMLElement | null}
+ */
+function heldNote(fixed) {
+  const said = Object.entries(fixed).map(([name, value]) => {
+    const shown = typeof value === "number" ? formatValue(name, value) : value;
+    return `${readableName(name.split(".")[1])} ${shown}`;
+  });
+  return said.length ? element("p", { class: "gain-note" }, `Held at ${said.join(", ")}.`) : null;
+}
+
+/**
  * @param {BestPoint | null} best
  * @param {number | null} stated error of the setup as stated [m]
  * @param {PlotAxis[]} drawn
@@ -574,7 +654,7 @@ const directionCard = ({ name, flat, change, low, high }) => {
   return element(
     "div",
     { class: "note-card", "data-direction": name, "data-flat": String(flat) },
-    element("strong", {}, `${capitalise(readableName(name.split(".")[0]))}: ${verdict}`),
+    element("strong", {}, `${parameterLabel(name)}: ${verdict}`),
     flat
       ? "The error does not change along it beyond what drawing the pushes anew changes: " +
           "these clouds cannot tell it. "
@@ -582,14 +662,7 @@ const directionCard = ({ name, flat, change, low, high }) => {
         ? "Only one push was compared, so nobody knows what chance does; " +
           "take more sequences or clouds. "
         : "",
-    `From best to worst the error changes by ${formatErrorChange(change)} ` +
-      `(95 % interval ${lowest} to ${highest}).`,
+    `From best to worst the error changes by ${formatErrorChange(change)}`,
+    flat === null ? "." : ` (95 % interval ${lowest} to ${highest}).`,
   );
 };
-
-/**
- * Return a parameter with its bounds as the range of a sweep.
- * @param {SweepableParameter} item
- * @returns {SweepBounds}
- */
-const wholeRange = ({ key, low, high }) => ({ name: key, low: low ?? 0, high: high ?? 0 });

@@ -311,7 +311,9 @@ function heatMap(axes, points, range, best) {
     },
     axes2d(across, upright.label + (upright.unit ? `, ${upright.unit}` : ""), ticks),
     points.map(spot),
-    mark ? svgElement("circle", { class: "best", cx: centre[0], cy: centre[1], r: 5.5 }) : null,
+    mark
+      ? svgElement("circle", { class: "best over", cx: centre[0], cy: centre[1], r: 5.5 })
+      : null,
   );
 }
 

@@ -351,12 +351,17 @@ export interface Parameter {
   scale: number | null;
   log: boolean;
   contrast: boolean;
+  /** Of a dataset: values that make sense in its phantom, and a value where it is not varied. */
+  span?: [number, number] | null;
+  begin?: number | string | null;
 }
 
 export interface Effect {
   name: string;
   summary: string;
   by_hand: boolean;
+  /** Of a dataset: why it cannot have the effect. */
+  impossible?: string | null;
   parameters: Parameter[];
 }
 
@@ -377,9 +382,19 @@ export interface WhatIfAnswer {
   noise_floor?: number | null;
   converged?: boolean;
   outcome?: string;
+  notes?: string[];
   problem?: ServerError;
   /** True while a newer answer is awaited. */
   waiting?: boolean;
+}
+
+/** Effects of the run's model, initial values of all others, those that this phantom cannot have
+ * with the reason, and the lowest and highest value [SI] that numbers of an effect have in it. */
+export interface WhatIfChoices {
+  model: EffectValues[];
+  beginnings: EffectValues[];
+  impossible: Record<string, string>;
+  spans: Record<string, Record<string, [number, number]>>;
 }
 
 export interface LiveAnswer {
@@ -450,7 +465,10 @@ export interface SweepDirection {
 export interface Sweep {
   id: string;
   job: Job | null;
-  request: { parameters: { parameter: string; low: number; high: number }[] } | null;
+  request: {
+    parameters: { parameter: string; low: number; high: number }[];
+    fixed?: Record<string, number | string>;
+  } | null;
   summary: { directions: SweepDirection[] } | null;
   data_changed: boolean | null;
 }

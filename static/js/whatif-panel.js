@@ -8,7 +8,8 @@ import { addPanel, openedPanel, openPanel } from "./panels.js";
 import { pageId } from "./scene.js";
 import { subscribe, set, state } from "./store.js";
 
-/** @import { Effect, EffectValues, Parameter, WhatIfAnswer, WhatIfRow } from "./types.js" */
+/** @import { Effect, EffectValues, Parameter, WhatIfAnswer, WhatIfChoices } from "./types.js" */
+/** @import { WhatIfRow } from "./types.js" */
 
 const KEY = "palpate.whatif";
 /** @type {HTMLElement} */
@@ -18,7 +19,7 @@ let catalogue = null;
 
 /**
  * The diagnosed effects of the run, and initial values of all effects for the shown sequence.
- * @type {{ key: string, model: EffectValues[], beginnings: EffectValues[] } | null}
+ * @type {({ key: string } & WhatIfChoices) | null}
  */
 let sequenceModel = null;
 /** @type {WhatIfRow[]} */
@@ -297,8 +298,26 @@ function draw() {
         "As diagnosed",
       ),
     ),
+    impossibleNote(),
   );
   drawAnswer();
+}
+
+/**
+ * Say which causes this phantom cannot have, and why; null where it can have all.
+ * @returns {HTMLElement | null}
+ */
+function impossibleNote() {
+  const reasons = Object.entries(sequenceModel?.impossible ?? {}).filter(
+    ([name]) => catalogue?.find((effect) => effect.name === name)?.by_hand,
+  );
+  if (!reasons.length) return null;
+  const said = reasons.map(([name, reason]) => `${readableName(name)} (${reason})`);
+  return element(
+    "p",
+    { class: "gain-note", id: "whatif-impossible" },
+    `Not with this phantom: ${said.join("; ")}.`,
+  );
 }
 
 /**
@@ -413,7 +432,7 @@ function choiceField(row, item) {
  * @returns {HTMLElement}
  */
 function sliderField(row, item, initial) {
-  const span = sliderRange(item, initial);
+  const span = sliderRange(withinBody(row.effect, item, initial), initial);
   const [factor, unit] = UNITS[item.unit] ?? [1, item.unit];
   const value = () => Number(row.parameters[item.name]);
   const shown = () => String(Number((value() * factor).toPrecision(4)));
@@ -475,6 +494,20 @@ function sliderField(row, item, initial) {
 }
 
 /**
+ * Return a parameter with the bounds that the phantom sets to it, such as its extent to a place.
+ * They are wider where the initial value lies outside.
+ * @param {string} effect
+ * @param {Parameter} item
+ * @param {number} initial
+ * @returns {Parameter}
+ */
+function withinBody(effect, item, initial) {
+  const [low, high] = sequenceModel?.spans[effect]?.[item.name] ?? [item.low, item.high];
+  if (low === null || high === null) return item;
+  return { ...item, low: Math.min(low, initial), high: Math.max(high, initial) };
+}
+
+/**
  * @param {Parameter} item
  * @param {number} factor
  * @param {string} unit
@@ -532,6 +565,7 @@ function drawAnswer() {
     noise_floor: floor,
     converged,
     outcome,
+    notes,
     waiting,
   } = answer;
   /** @type {[string, number | null | undefined, string][]} */
@@ -571,6 +605,14 @@ function drawAnswer() {
             element("strong", {}, "No equilibrium"),
             `${capitalise(outcome ?? "")}.`,
           ),
+      (notes ?? []).map((note) =>
+        element(
+          "div",
+          { class: "note-card" },
+          element("strong", {}, "Note"),
+          `${capitalise(note)}.`,
+        ),
+      ),
     ),
   );
 }

@@ -136,7 +136,7 @@ def _draw_legend(axis: Axes, dataset: Dataset, colours: Colormap, norm: Normaliz
         cax=axis.inset_axes((0, 0.1, 0.9, 0.04)),
         orientation="horizontal",
     )
-    bar.set_label("overlap of the tool with the box at rest [mm]", color=_INK, fontsize=9)
+    bar.set_label("overlap of the tool with the phantom at rest [mm]", color=_INK, fontsize=9)
     bar.ax.tick_params(colors=_INK, labelsize=9)
     bar.outline.set_visible(False)
     axis.plot([0.02], [0.24], "D", color=_LANDMARK, markersize=5, transform=axis.transAxes)

@@ -16,17 +16,14 @@ def applicable_effects(
     """Return the effects that these measurements can show, in the catalogue's order.
 
     Args:
-        setup: as stated; some effects need a box, some a free form.
+        setup: as stated; not every setup can have every effect.
         clouds: whether any sequence has clouds.
         forces: whether any has forces.
         catalogue: to choose from.
     """
     made = {Measurement.CLOUDS: clouds, Measurement.FORCES: forces}
-    box = setup.geometry.is_block
     return tuple(
         kind
         for kind in catalogue
-        if any(made[item] for item in kind.shown_by)
-        and (box or not kind.needs_box)
-        and not (box and kind.needs_shape)
+        if any(made[item] for item in kind.shown_by) and not kind.impossible(setup)
     )

@@ -49,13 +49,13 @@ def modulus_entries(
     if interval is None:
         why = (
             "the tool is driven by position and no force was measured: "
-            "a block of any stiffness takes the same shape"
+            "a phantom of any stiffness takes the same shape"
         )
         return [], [
             _unknown(
                 name,
                 why,
-                "the force on the tool (forces.csv), or a drop of known weight on the block",
+                "the force on the tool (forces.csv), or a drop of known weight on the phantom",
             )
         ]
     value, low, high = interval

@@ -168,7 +168,7 @@ def _pairing_sentence(
         f"({after / before - 1:+.0%}) with {', '.join(changes)}."
     )
     why = (
-        " As stated, the tool would be inside the block or under the table at the start of "
+        " As stated, the tool would be inside the phantom or under the table at the start of "
         f"{blocked:.0%} of the sequences."
         if blocked >= IMPOSSIBLE
         else ""

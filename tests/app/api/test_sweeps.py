@@ -95,6 +95,11 @@ def test_a_sweep_runs_and_its_points_come(home: Path, serve: Any) -> None:
         rest = client.get(f"/api/sweeps/{identity}/points", params={"after": first["next"]}).json()
         numbers = [row["number"] for row in (*first["points"], *rest["points"])]
         assert sorted(numbers) == list(range(6)) and len(first["points"]) == 2
+        best = found["summary"]["best"]["number"]
+        replay = client.get(f"/api/sweeps/{identity}/points/{best}/replay").json()
+        assert replay["effects"] == [{"effect": "tool_radius", "parameters": {"radius": 6e-3}}]
+        assert client.post("/api/replays", json=replay).status_code == 202
+        assert client.get(f"/api/sweeps/{identity}/points/99/replay").status_code == 404
         again = client.post("/api/sweeps", json=ASKED).json()["id"]
         assert ended(client, again)["summary"]["replays_computed"] == 0
         assert client.post(f"/api/sweeps/{again}/cancel").status_code == 409

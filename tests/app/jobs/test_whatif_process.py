@@ -57,6 +57,9 @@ def test_beginnings_are_the_models_effects_and_the_catalogue(there: httpx.Client
         for one in there.get("/api/effects").json()
     }
     assert all(list(one["parameters"]) == known[one["effect"]] for one in found["beginnings"])
+    assert "surface is stated" in found["impossible"]["geometry_local"]
+    low, high = found["spans"]["stiff_inclusion"]["x"]
+    assert low == -high < 0
 
 
 def test_a_frame_is_solved_with_any_causes(there: httpx.Client, run: Path) -> None:

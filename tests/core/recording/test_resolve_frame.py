@@ -94,6 +94,24 @@ def test_every_effect_has_a_usable_initial_value(what: FrameResolver) -> None:
     rows = what.beginnings()
     assert {"stiff_inclusion", "gravity", "time_offset"} <= {row["effect"] for row in rows}
     assert [effect.name for effect in effects_from(rows)] == [row["effect"] for row in rows]
+    assert "geometry_local" not in {row["effect"] for row in rows}
+    assert set(what.impossible()) == {"geometry_local"}
+    assert {"stiff_inclusion", "stiff_tube"} == set(what.spans())
+
+
+def test_lump_outside_the_body_is_said_to_change_nothing(what: FrameResolver) -> None:
+    lump = {"x": 0.0, "y": 0.0, "z": 0.02, "radius": 5e-3, "stiffness_ratio": 8.0}
+    pipe = {"aside": 0.0, "z": 0.02, "heading": 0.3, "inclination": 0.0, "bend": 0.0, "sag": 0.0}
+    pipe |= {"radius": 3e-3, "stiffness_ratio": 8.0}
+    for name, inside, outside in (
+        ("stiff_inclusion", lump, {"x": 0.2}),
+        ("stiff_tube", pipe, {"aside": 0.2}),
+    ):
+        near, far = (
+            what.solve(0, effects_from([{"effect": name, "parameters": values}]))
+            for values in (inside, {**inside, **outside})
+        )
+        assert near.notes == () and "outside the phantom" in far.notes[0]
 
 
 def test_missing_frame_is_refused(what: FrameResolver) -> None:

@@ -37,3 +37,10 @@ def test_setup_has_swept_and_fixed_values() -> None:
 
 def test_line_of_a_modulus_is_evenly_spaced_in_its_logarithm() -> None:
     assert Axis("young_modulus.E", 1e3, 1e5).line(3) == pytest.approx([1e3, 1e4, 1e5])
+
+
+def test_effects_of_a_point_have_the_fixed_values_and_the_stated_ones() -> None:
+    size = Axis("geometry_scale.scale_x", 0.9, 1.1)
+    space = ParameterSpace((size,), {"geometry_scale.scale_z": 1.02})
+    (effect,) = space.effects(SETUP, {size.name: 0.95})
+    assert effect.values() == {"scale_x": 0.95, "scale_y": 1.0, "scale_z": 1.02}

@@ -67,7 +67,7 @@ def test_a_mirrored_order_that_fits_upside_down_is_noticed_by_where_the_tool_wou
     found = propose_pairing(mirrored, touches(), EXPECTED, BLOCK, POSE.inverse().apply(STARTS))
     assert found is not None
     assert found.pairing == NAMES
-    assert "inside the block or under the table" in found.sentence
+    assert "inside the phantom or under the table" in found.sentence
 
 
 @pytest.mark.parametrize(("scale", "word"), [(0.88, "smaller"), (1.12, "larger")])
