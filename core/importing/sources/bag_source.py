@@ -1,0 +1,327 @@
+"""ROS 1 bags, and ROS 2 recordings in sqlite3 or mcap, as folders or bare files."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from functools import cached_property, partial
+from heapq import merge
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.rosbag1 import Reader as Ros1Reader
+from rosbags.rosbag1 import ReaderError as Ros1Error
+from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag2 import ReaderError as Ros2Error
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError
+from palpate.importing.messages.message_kinds import KINDS, header_of, nested_transforms
+from palpate.importing.rules import ColumnRules
+from palpate.importing.sources.recovered_mcap import RecoveredMcap
+from palpate.importing.sources.recovered_ros1 import RecoveredRos1
+from palpate.importing.sources.recovered_sqlite import RecoveredSqlite
+from palpate.importing.stream import Sample, Stream
+
+__all__ = ["BagSource"]
+
+_TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+_PEEKED = 300
+"""Messages of tf that are read to list its frames."""
+_BROKEN = (
+    Ros1Error, Ros2Error, SerdeError, struct.error, RuntimeError, OSError, EOFError, ValueError,
+    AssertionError,
+)  # fmt: skip
+"""Errors of readers at damaged places."""
+_SUFFIXES = {".bag": "ROS 1 bag", ".db3": "ROS 2 sqlite3", ".mcap": "ROS 2 mcap"}
+
+
+class BagSource:
+    """One recording of ROS; its messages are read one by one.
+
+    Attributes:
+        path: of the file, or of the folder with metadata.yaml.
+        warnings: found on opening and reading.
+        has_receipt: whether times of receipt are a clock of their own.
+        rules: None, as it is no table.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.warnings: list[str] = []
+        self.has_receipt = True
+        self.rules: ColumnRules | None = None
+        self._is_ros2 = path.suffix != ".bag"
+        self._readers = self._opened()
+        self._connections = [one for reader in self._readers for one in reader.connections]
+        self._check_coding()
+
+    @staticmethod
+    def fits(path: Path) -> bool:
+        """Whether a path is such a recording, by its name."""
+        if path.is_dir():
+            return (path / "metadata.yaml").is_file() or bool(_bare(path))
+        return path.suffix in _SUFFIXES
+
+    def files(self) -> tuple[Path, ...]:
+        """List the files that hold the messages."""
+        if self.path.is_file():
+            return (self.path,)
+        return tuple(sorted(one for one in self.path.iterdir() if one.is_file()))
+
+    def close(self) -> None:
+        """Close the files."""
+        for reader in self._readers:
+            with suppress(Exception):
+                reader.close()
+
+    def streams(self) -> tuple[Stream, ...]:
+        """List the topics, sorted, and each frame of tf on its own."""
+        return self._streams
+
+    @cached_property
+    def _streams(self) -> tuple[Stream, ...]:
+        topics: dict[str, list[Any]] = {}
+        for one in self._connections:
+            topics.setdefault(one.topic, []).append(one)
+        found: list[Stream] = []
+        for topic, connections in sorted(topics.items()):
+            found.extend(self._listed(topic, connections))
+        return tuple(found)
+
+    def samples(self, names: Collection[str]) -> Iterator[Sample]:
+        """Read the samples of these streams in order of receipt.
+
+        A damaged place ends the reading, with a warning that says at which time.
+        """
+        topics = {name.partition("#")[0] for name in names}
+        last = 0
+        try:
+            for connection, received, raw in self._messages(topics):
+                last = received
+                for sample in self._decoded(connection, received, raw):
+                    if sample.stream in names:
+                        yield sample
+        except _BROKEN as error:
+            text = f"{self.path.name}: damaged after t = {last / 1e9:.3f} s ({error}); what is "
+            self.warnings.append(text + "before it was read")
+
+    def _messages(self, topics: Collection[str]) -> Iterator[tuple[Any, int, bytes]]:
+        parts = [
+            reader.messages(chosen)
+            for reader in self._readers
+            if (chosen := [one for one in reader.connections if one.topic in topics])
+        ]
+        yield from parts[0] if len(parts) == 1 else merge(*parts, key=lambda one: one[1])
+
+    def _decoded(self, connection: Any, received: int, raw: bytes) -> Iterator[Sample]:
+        if connection.msgtype in _TRANSFORMS:
+            for parent, child, stamp, pose in nested_transforms(
+                self._message(connection.msgtype, raw)
+            ):
+                name = f"{connection.topic}#{child}"
+                yield Sample(
+                    stream=name,
+                    received=received,
+                    stamped=stamp,
+                    frame=parent,
+                    value=partial(np.asarray, pose),
+                )
+            return
+        kind = KINDS[connection.msgtype]
+        stamp, frame = header_of(raw, self._is_ros2) if kind.has_header else (0, "")
+        yield Sample(
+            stream=connection.topic,
+            received=received,
+            stamped=stamp,
+            frame=frame,
+            value=partial(self._value, connection, raw, received),
+        )
+
+    def _value(self, connection: Any, raw: bytes, received: int) -> FloatArray:
+        try:
+            message = self._message(connection.msgtype, raw)
+        except _BROKEN as error:
+            raise DatasetError(
+                f"{self.path.name}: a message of {connection.topic} at t = {received / 1e9:.3f} s "
+                f"is no {connection.msgtype} ({error}); expected a whole one",
+                file=self.path.name,
+            ) from None
+        return KINDS[connection.msgtype].decode(message)
+
+    def _message(self, kind: str, raw: bytes) -> Any:
+        if self._is_ros2:
+            return self._types.deserialize_cdr(raw, kind)
+        return self._types.deserialize_ros1(raw, kind)
+
+    @cached_property
+    def _types(self) -> Any:
+        store = get_typestore(Stores.LATEST if self._is_ros2 else Stores.ROS1_NOETIC)
+        for name in _TRANSFORMS:
+            if name not in store.types:
+                definition = "geometry_msgs/TransformStamped[] transforms"
+                store.register(get_types_from_msg(definition, name))
+        return store
+
+    def _listed(self, topic: str, connections: list[Any]) -> list[Stream]:
+        """Streams of one topic."""
+        kinds = {one.msgtype for one in connections}
+        count = sum(one.msgcount for one in connections)
+        first, last = self._span()
+        name = " and ".join(sorted(kinds)).replace("/msg/", "/")
+        if len(kinds) == 1 and kinds <= set(_TRANSFORMS) and count:
+            return self._listed_frames(topic, name, count, (last - first) / 1e9)
+        kind = KINDS.get(next(iter(kinds))) if len(kinds) == 1 else None
+        peeked = next(iter(self.samples({topic})), None) if kind is not None and count else None
+        frames = (peeked.frame,) if peeked is not None and peeked.frame else ()
+        return [
+            Stream(
+                name=topic,
+                kind=_kind(kind.kind if kind else "other", topic, peeked),
+                message_type=name,
+                count=count,
+                seconds=(last - first) / 1e9,
+                frames=frames,
+            )
+        ]
+
+    def _listed_frames(self, topic: str, name: str, count: int, seconds: float) -> list[Stream]:
+        """One stream for each child frame among the first transforms, its parent as frame id."""
+        edges: dict[tuple[str, str], int] = {}
+        read = 0
+        for connection, _, raw in self._messages({topic}):
+            for parent, child, _, _ in nested_transforms(self._message(connection.msgtype, raw)):
+                edges[child, parent] = edges.get((child, parent), 0) + 1
+            read += 1
+            if read >= _PEEKED:
+                break
+        return [
+            Stream(
+                name=f"{topic}#{child}",
+                kind="pose",
+                message_type=name,
+                count=round(share * count / read),
+                seconds=seconds,
+                frames=(parent,),
+            )
+            for (child, parent), share in sorted(edges.items())
+        ]
+
+    def _span(self) -> tuple[int, int]:
+        """Stamps of the first and the last message [ns]."""
+        first = min((reader.start_time for reader in self._readers), default=0)
+        last = max((reader.end_time for reader in self._readers), default=0) - 1
+        return (first, last) if last >= first else (0, 0)
+
+    def _opened(self) -> list[Any]:
+        """Readers of the file or folder; DatasetError where nothing of it can be read."""
+        if self.path.is_dir() and not (self.path / "metadata.yaml").is_file():
+            self.warnings.append(f"{self.path.name}: has no metadata.yaml; its files were read")
+            return [self._reader(one) for one in _bare(self.path)]
+        try:
+            return [self._whole(self.path)]
+        except Ros2Error as error:
+            if "Serialization format" in str(error):
+                raise self._unknown_coding(str(error)) from None
+            if not self.path.is_dir() or not _bare(self.path):
+                return [self._recovered(self.path, error)]
+            text = f"{self.path.name}: its metadata.yaml is damaged ({error}); its files were read"
+            self.warnings.append(text)
+            return [self._reader(one) for one in _bare(self.path)]
+        except _BROKEN as error:
+            return [self._recovered(self.path, error)]
+
+    def _reader(self, path: Path) -> Any:
+        try:
+            return self._whole(path)
+        except _BROKEN as error:
+            return self._recovered(path, error)
+
+    @staticmethod
+    def _whole(path: Path) -> Any:
+        reader = Ros1Reader(path) if path.suffix == ".bag" else Ros2Reader(path)
+        reader.open()
+        return reader
+
+    def _recovered(self, path: Path, error: BaseException) -> Any:
+        """Read what is whole of a damaged file."""
+        makers: dict[str, Callable[[Path], Any]] = {
+            ".bag": RecoveredRos1,
+            ".mcap": lambda one: _Bare(RecoveredMcap(one)),
+            ".db3": RecoveredSqlite,
+        }
+        if path.suffix in makers and path.is_file():
+            with suppress(*_BROKEN):
+                reader = makers[path.suffix](path)
+                reader.open()
+                if reader.connections:
+                    self.warnings.append(
+                        f"{path.name}: is cut off or damaged ({error}); the whole part was read"
+                    )
+                    return reader
+        raise DatasetError(
+            f"{path.name} cannot be read: {error}; expected a whole recording of ROS: copy it "
+            "again, or record it anew",
+            file=path.name,
+        )
+
+    def _check_coding(self) -> None:
+        """Refuse empty recordings and unknown serialisation, by name."""
+        codings = {
+            getattr(one.ext, "serialization_format", "cdr") or "cdr" for one in self._connections
+        }
+        if unknown := sorted(codings - {"cdr", "ros2msg"}):
+            raise self._unknown_coding(f"Serialization format {unknown} is not supported.")
+        if not any(one.msgcount for one in self._connections):
+            raise DatasetError(
+                f"{self.path.name} holds no messages; expected a recording: record it again",
+                file=self.path.name,
+            )
+
+    def _unknown_coding(self, found: str) -> DatasetError:
+        return DatasetError(
+            f"{self.path.name}: {found} Expected cdr: convert it by ros2 bag convert where this "
+            "format is installed",
+            file=self.path.name,
+        )
+
+
+class _Bare:
+    """A storage file of rosbags with the stamps that its folder would state."""
+
+    def __init__(self, storage: Any) -> None:
+        self._storage = storage
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._storage, name)
+
+    @property
+    def start_time(self) -> int:
+        """Stamp of the first message [ns]."""
+        return int(self._storage.metadata.start_time)
+
+    @property
+    def end_time(self) -> int:
+        """Stamp after the last message [ns]."""
+        return int(self._storage.metadata.end_time)
+
+
+def _bare(folder: Path) -> list[Path]:
+    """Storage files of ROS 2 in a folder, sorted."""
+    found = (one for one in folder.iterdir() if one.suffix in (".db3", ".mcap"))
+    return sorted(one for one in found if not one.name.startswith("."))
+
+
+def _kind(kind: Any, topic: str, peeked: Sample | None) -> Any:
+    """Kind of a stream: colour images are no depth."""
+    if kind != "depth" or peeked is None:
+        return kind
+    try:
+        peeked.value()
+    except DatasetError:
+        return "other"
+    return kind
