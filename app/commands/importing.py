@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["import_"]
 
+OTHER_CLOCK = 1.0
+"""Delay between stamp and receipt that no delivery takes [s]."""
+
 
 def import_(
     files: Annotated[
@@ -125,16 +128,32 @@ def _print_streams(recording: Recording) -> None:
     table = Table(
         title=escape(title), header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False
     )
-    for column in ("stream", "kind", "type", "samples", "rate", "frame"):
-        right = column in ("samples", "rate")
+    for column in ("stream", "kind", "type", "samples", "rate", "delay", "frame"):
+        right = column in ("samples", "rate", "delay")
         table.add_column(column, justify="right" if right else "left", overflow="fold")
     for one in recording.streams():
         rate = f"{one.rate:.1f} Hz" if 0 < one.rate < 1e6 else "–"
         table.add_row(
             escape(one.name), one.kind, one.message_type, str(one.count), rate,
+            _delay(one.delay),
             escape(", ".join(one.frames)),
         )  # fmt: skip
     out.print(table)
+    for one in recording.streams():
+        if one.delay is not None and abs(one.delay) > OTHER_CLOCK:
+            print_warnings(
+                [
+                    f"{one.name}: its header stamps are {one.delay:.1f} s before their receipt: "
+                    "another clock, or a time that was never set"
+                ]
+            )
+
+
+def _delay(seconds: float | None) -> str:
+    """Delay between stamp and receipt, in words."""
+    if seconds is None:
+        return "–"
+    return "other clock" if abs(seconds) > OTHER_CLOCK else f"{1e3 * seconds:.1f} ms"
 
 
 def _print_notes(notes: ImportNotes) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.rules import WrenchRules
@@ -70,7 +70,7 @@ def _without_zero(
     recording: TimedRecording,
     rules: WrenchRules,
     to_robot: Rotation,
-    clear: FloatArray,
+    clear: BoolArray,
     notes: ImportNotes,
 ) -> FloatArray:
     """Forces in the sensor's axes without its zero and, where it is asked for, weight."""
@@ -85,7 +85,7 @@ def _without_zero(
                 "one zero"
             )
         notes.decide(f"{recording.name}: zero of the forces {_numbers(zero)} N")
-        return forces - zero
+        return np.asarray(forces - zero)
     matrices = turns.inv().as_matrix()
     rows = np.concatenate([np.tile(np.eye(3), (len(matrices), 1, 1)), matrices], axis=2)
     fit, *_ = np.linalg.lstsq(rows.reshape(-1, 6), forces[clear].ravel(), rcond=None)

@@ -27,6 +27,7 @@ class Stream:
         count: number of samples.
         seconds: from the first to the last sample, by receipt [s].
         frames: frame ids of the first samples.
+        delay: from the first header stamp to its receipt [s]; None without both.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Stream:
     count: int
     seconds: float
     frames: tuple[str, ...] = ()
+    delay: float | None = None
 
     @property
     def rate(self) -> float:

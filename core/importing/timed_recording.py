@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
 from palpate.importing.clocks.common_clock import on_common_clock
@@ -121,7 +121,7 @@ def _timed(
     )
 
 
-def _whole_poses(track: Track, poses: FloatArray, notes: ImportNotes) -> FloatArray:
+def _whole_poses(track: Track, poses: FloatArray, notes: ImportNotes) -> BoolArray:
     """Whether each pose (n, 7) is finite and has an orientation."""
     norms = np.linalg.norm(poses[:, 3:], axis=1)
     good = np.isfinite(poses).all(axis=1) & (np.abs(norms - 1) < 0.1)

@@ -58,7 +58,11 @@ class BagSource:
         self._is_ros2 = path.suffix != ".bag"
         self._readers = self._opened()
         self._connections = [one for reader in self._readers for one in reader.connections]
-        self._check_coding()
+        try:
+            self._check_coding()
+        except DatasetError:
+            self.close()
+            raise
 
     @staticmethod
     def fits(path: Path) -> bool:
@@ -101,7 +105,7 @@ class BagSource:
         topics = {name.partition("#")[0] for name in names}
         last = 0
         try:
-            for connection, received, raw in self._messages(topics):
+            for connection, received, raw in self.messages(topics):
                 last = received
                 for sample in self._decoded(connection, received, raw):
                     if sample.stream in names:
@@ -110,7 +114,8 @@ class BagSource:
             text = f"{self.path.name}: damaged after t = {last / 1e9:.3f} s ({error}); what is "
             self.warnings.append(text + "before it was read")
 
-    def _messages(self, topics: Collection[str]) -> Iterator[tuple[Any, int, bytes]]:
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[Any, int, bytes]]:
+        """Read connection, time of receipt [ns] and bytes of the messages of these topics."""
         parts = [
             reader.messages(chosen)
             for reader in self._readers
@@ -177,7 +182,7 @@ class BagSource:
             return self._listed_frames(topic, name, count, (last - first) / 1e9)
         kind = KINDS.get(next(iter(kinds))) if len(kinds) == 1 else None
         peeked = next(iter(self.samples({topic})), None) if kind is not None and count else None
-        frames = (peeked.frame,) if peeked is not None and peeked.frame else ()
+        frame, delay = self._first_header(topic) if count and len(kinds) == 1 else ("", None)
         return [
             Stream(
                 name=topic,
@@ -185,15 +190,29 @@ class BagSource:
                 message_type=name,
                 count=count,
                 seconds=(last - first) / 1e9,
-                frames=frames,
+                frames=(frame,) if frame else (),
+                delay=delay,
             )
         ]
+
+    def _first_header(self, topic: str) -> tuple[str, float | None]:
+        """Frame id and delay from stamp to receipt [s] of the first message; of any type that
+        begins with a header.
+        """
+        with suppress(*_BROKEN):
+            for connection, received, raw in self.messages({topic}):
+                kind = self._types.types.get(connection.msgtype)
+                if kind is None or next(iter(kind.__dataclass_fields__)) != "header":
+                    break
+                stamp, frame = header_of(raw, self._is_ros2)
+                return frame, (received - stamp) / 1e9 if stamp else None
+        return "", None
 
     def _listed_frames(self, topic: str, name: str, count: int, seconds: float) -> list[Stream]:
         """One stream for each child frame among the first transforms, its parent as frame id."""
         edges: dict[tuple[str, str], int] = {}
         read = 0
-        for connection, _, raw in self._messages({topic}):
+        for connection, _, raw in self.messages({topic}):
             for parent, child, _, _ in nested_transforms(self._message(connection.msgtype, raw)):
                 edges[child, parent] = edges.get((child, parent), 0) + 1
             read += 1
