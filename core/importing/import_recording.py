@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from palpate.dataset.folder import open_dataset
+from palpate.foundation.arrays import BoolArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, part, silent
+from palpate.importing.clocks.track import Stamps
 from palpate.importing.cutting.pushes import LocatedPhantom, find_pushes, whole_recording
 from palpate.importing.cutting.split_proposal import proposed_splits
 from palpate.importing.earlier_import import EarlierImport, file_digests, window_digest
@@ -233,5 +235,5 @@ def _from(mapping: ImportMapping, base: Path) -> ImportMapping:
     return mapping.model_copy(update=changed)
 
 
-def _inside(times: np.ndarray, window: SequenceWindow) -> np.ndarray:  # type: ignore[type-arg]
-    return (times >= window.start * 1e9) & (times <= window.end * 1e9)
+def _inside(times: Stamps, window: SequenceWindow) -> BoolArray:
+    return np.asarray((times >= window.start * 1e9) & (times <= window.end * 1e9))

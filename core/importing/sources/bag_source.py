@@ -277,7 +277,9 @@ class BagSource:
             with suppress(*_BROKEN):
                 reader = makers[path.suffix](path)
                 reader.open()
-                if reader.connections:
+                if not reader.connections:
+                    reader.close()
+                else:
                     self.warnings.append(
                         f"{path.name}: is cut off or damaged ({error}); the whole part was read"
                     )

@@ -6,11 +6,12 @@ import json
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from palpate.dataset.cloud import read_cloud
+from palpate.dataset.cloud import read_points
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.importing.messages.depth_messages import depth_from_png
@@ -48,17 +49,18 @@ def read_cloud_file(path: Path) -> FloatArray:
 
 
 def _ply(path: Path) -> FloatArray:
-    """By the strict reader of datasets, and by Open3D for what that refuses but is no damage."""
+    """By the reader of datasets, which finds damage; a header with umlauts is written anew."""
     try:
-        return np.array(read_cloud(path.parent, path.name))
-    except DatasetError as error:
-        head = path.read_bytes()[: 2**14].split(b"end_header")[0].decode("latin-1")
-        words = head.split()
-        count = int(words[words.index("vertex") + 1]) if "vertex" in words else 0
-        points = _by_open3d(path)
-        if not count or len(points) != count:
-            raise error from None
-        return points
+        return np.array(read_points(path.parent, path.name))
+    except DatasetError:
+        data = path.read_bytes()
+        head, end, body = data.partition(b"end_header")
+        if not end or head.isascii():
+            raise
+        with TemporaryDirectory() as folder:
+            plain = head.decode("latin-1").encode("ascii", "replace")
+            (Path(folder) / path.name).write_bytes(plain + end + body)
+            return np.array(read_points(Path(folder), path.name))
 
 
 def _pcd(path: Path) -> FloatArray:

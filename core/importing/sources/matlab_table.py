@@ -49,7 +49,7 @@ def read_matlab(path: Path) -> TextTable:
             labels = _labels(name, matrix.shape[1])
             for label, numbers in zip(labels, matrix.T, strict=True):
                 columns[label] = [repr(number) for number in numbers.tolist()]
-    return TextTable(path.name, columns, 1, True)
+    return TextTable(path.name, columns, tuple(range(1, length + 1)), True)
 
 
 def _is_numeric(name: str, value: object) -> bool:

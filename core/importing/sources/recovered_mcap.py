@@ -15,13 +15,7 @@ _LAST = (0x02, 0x0F)
 
 
 class RecoveredMcap(McapReader):
-    """An MCAP file without its end: all whole records of it.
-
-    Attributes:
-        lost: bytes at the end that belong to no whole record.
-    """
-
-    lost: int = 0
+    """An MCAP file without its end: all whole records of it."""
 
     def _open(self) -> None:
         """Find the end of the whole records and read all of them; ReaderError where none is."""
@@ -39,7 +33,6 @@ class RecoveredMcap(McapReader):
         if len(ends) < 2:
             raise ReaderError("No whole record is there.")
         self.data_start, self.data_end = ends[0], ends[-1]
-        self.lost = size - self.data_end
         self.meta_scan()
         assert self.statistics
         counts = self.statistics.channel_message_counts

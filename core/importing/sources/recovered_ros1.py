@@ -16,6 +16,7 @@ from rosbags.rosbag1.reader import (
     Reader,
     ReaderError,
     RecordType,
+    decompressors,
     read_bytes,
     read_uint32,
 )
@@ -24,13 +25,9 @@ __all__ = ["RecoveredRos1"]
 
 
 class RecoveredRos1(Reader):
-    """A ROS 1 bag whose recording was cut off: all whole chunks of it.
+    """A ROS 1 bag whose recording was cut off: all whole messages of it."""
 
-    Attributes:
-        lost: bytes at the end that belong to no whole chunk.
-    """
-
-    lost: int = 0
+    _size: int = 0
 
     def open(self) -> None:
         """Find the whole chunks; ReaderError where there is none."""
@@ -39,14 +36,12 @@ class RecoveredRos1(Reader):
             if not bio.readline().startswith(b"#ROSBAG V2"):
                 raise ReaderError("File magic is invalid.")
             self._skip_record(bio)
-            size, end = self.path.stat().st_size, bio.tell()
-            while end < size:
+            self._size = self.path.stat().st_size
+            while bio.tell() < self._size:
                 try:
                     self._read_record(bio)
                 except (ReaderError, RuntimeError, OSError, ValueError, EOFError):
                     break
-                end = bio.tell()
-            self.lost = size - end
         except BaseException:
             self.bio = None
             bio.close()
@@ -68,6 +63,8 @@ class RecoveredRos1(Reader):
         bio.seek(at)
         chunk = self.read_chunk()
         end = bio.tell()
+        if end > self._size and chunk.decompressor is decompressors["none"]:
+            chunk, end = chunk._replace(datasize=self._size - chunk.datapos), self._size
         bio.seek(chunk.datapos)
         inner = BytesIO(chunk.decompressor(read_bytes(bio, chunk.datasize)))
         self._index(at, chunk, list(_inner_records(self, inner)))
@@ -102,13 +99,17 @@ class RecoveredRos1(Reader):
 
 
 def _inner_records(bag: RecoveredRos1, inner: BytesIO) -> Iterator[tuple[int, int, int]]:
-    """Connection, stamp [ns] and offset of each message in a chunk."""
+    """Connection, stamp [ns] and offset of each whole message in a chunk."""
     size = len(inner.getbuffer())
     while (at := inner.tell()) < size:
-        header = Header.read(inner)
-        kind = header.get_uint8("op")
-        length = read_uint32(inner)
-        end = inner.tell() + length
+        try:
+            header = Header.read(inner)
+            kind = header.get_uint8("op")
+            end = read_uint32(inner) + inner.tell()
+        except ReaderError:
+            return
+        if end > size:
+            return
         if kind == RecordType.CONNECTION:
             bag.take_connection(inner, at)
         elif kind == RecordType.MSGDATA:

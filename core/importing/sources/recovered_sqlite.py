@@ -78,6 +78,9 @@ class RecoveredSqlite:
         assert self._database is not None
         query = f"SELECT topic_id, timestamp, {column} FROM messages NOT INDEXED ORDER BY id"
         try:
-            yield from self._database.execute(query)
+            for topic, stamp, value in self._database.execute(query):
+                if topic is None or stamp is None or value is None:
+                    return  # pages beyond the end read as zeros
+                yield topic, stamp, value
         except sqlite3.Error:
             return

@@ -28,14 +28,14 @@ class TextTable:
     Attributes:
         file: name of its file.
         columns: texts by the name of the column, or by its number from 1 without a header.
-        first_row: line of the first row in the file.
+        lines: line of each row in the file, from 1.
         has_header: whether the file names its columns.
         comma_decimals: whether numbers have a decimal comma.
     """
 
     file: str
     columns: dict[str, list[str]]
-    first_row: int
+    lines: tuple[int, ...]
     has_header: bool
     comma_decimals: bool = False
 
@@ -52,10 +52,10 @@ class TextTable:
         except ValueError:
             at = next(n for n, one in enumerate(texts) if not _NUMBER.fullmatch(one.strip()))
             raise DatasetError(
-                f"{self.file}, row {at + self.first_row}: {column} = '{texts[at][:40]}'; expected "
+                f"{self.file}, row {self.lines[at]}: {column} = '{texts[at][:40]}'; expected "
                 "a number: correct or remove this row",
                 file=self.file,
-                row=at + self.first_row,
+                row=self.lines[at],
                 key=column,
             ) from None
 
@@ -102,7 +102,7 @@ def read_table(path: Path) -> TextTable:
             f"{path.name} has a header but no rows; expected numbers: export it again",
             file=path.name,
         )
-    first = lines[0 if header is None else 1][0]
+    numbers = [number for number, _ in lines[0 if header is None else 1 :]]
     width = len(rows[0]) if header is None else len(header)
     for at, row in enumerate(rows):
         if len(row) != width:
@@ -110,14 +110,14 @@ def read_table(path: Path) -> TextTable:
                 rows.pop()  # a recording that was cut off in its last row
                 break
             raise DatasetError(
-                f"{path.name}, row {at + first}: {len(row)} columns; expected {width}: complete "
+                f"{path.name}, row {numbers[at]}: {len(row)} columns; expected {width}: complete "
                 "or remove this row",
                 file=path.name,
-                row=at + first,
+                row=numbers[at],
             )
     names = _names(header, width)
     columns = {name: [row[at] for row in rows] for at, name in enumerate(names)}
-    return TextTable(path.name, columns, first, header is not None, comma)
+    return TextTable(path.name, columns, tuple(numbers), header is not None, comma)
 
 
 def _decoded(path: Path) -> str:

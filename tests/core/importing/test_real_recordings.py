@@ -72,7 +72,7 @@ def test_chunks_out_of_order_are_read_in_the_order_of_time() -> None:
 
 
 def test_an_empty_bag_is_one_clear_sentence() -> None:
-    with pytest.raises(DatasetError, match="no-messages.bag holds no messages"):
+    with pytest.raises(DatasetError, match=r"no-messages\.bag holds no messages"):
         open_source(HOME / "ros1" / "no-messages.bag")
 
 
