@@ -95,7 +95,7 @@ def _without_zero(
         f"{recording.name}: zero of the forces {_numbers(zero)} N, weight "
         f"{_numbers(weight)} N in the robot frame, {left:.3f} N left"
     )
-    return np.asarray(forces - zero - to_robot.inv().apply(np.broadcast_to(weight, forces.shape)))
+    return np.asarray(forces - zero - to_robot.inv().apply(np.tile(weight, (len(forces), 1))))
 
 
 def _numbers(values: FloatArray) -> str:

@@ -92,7 +92,8 @@ def found_phantom(
         )
         return None
     notes.decide(f"robot and phantom: {fits[0].summary}" if fits[0].summary else "robot: stated")
-    return LocatedPhantom(geometry, config.tool_radius, fits[0].phantom_from_robot)
+    pose = fits[0].phantom_from_robot
+    return LocatedPhantom(geometry, config.tool_radius, pose, touches.positions)
 
 
 def _find_touches(

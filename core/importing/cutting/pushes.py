@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,8 @@ __all__ = ["LocatedPhantom", "find_pushes", "whole_recording"]
 
 SHALLOW = 0.0005
 """Depth below which a contact is a touch or a trace [m], about the accuracy of touches."""
+AT_TOUCH = 0.001
+"""Distance to a touched place within which the tool is at it [m], about the accuracy of touches."""
 JOINED = 0.5
 """Pause between two contacts of one push [s]: the ball skids, or noise lifts it."""
 MOVING = 0.002
@@ -33,16 +35,27 @@ class LocatedPhantom:
         geometry: of the phantom.
         radius: of the ball [m].
         phantom_from_robot: from touches, traces or a stated pose.
+        touched: (n, 3) tool centres at the touches of landmarks [m], robot frame.
     """
 
     geometry: Box | Shape
     radius: float
     phantom_from_robot: Transform
+    touched: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def contacts(self, recording: TimedRecording) -> tuple[tuple[Contact, ...], FloatArray]:
         """Contacts of a recording, and the gaps (n,) [m] at `averaged_path`'s times."""
         time, path = averaged_path(recording.time, self.in_phantom(recording))
         return find_contacts(self.geometry, self.radius, time, path)
+
+    def is_touch(self, recording: TimedRecording, push: Contact) -> bool:
+        """Whether a contact comes to a touched place without travelling along the surface."""
+        if push.kind == "drag" or not len(self.touched):
+            return False
+        time = recording.time
+        path = recording.positions[(time >= push.start) & (time <= push.end)]
+        apart = np.linalg.norm(path[:, None] - self.touched, axis=2)
+        return bool(len(path) and apart.min() < AT_TOUCH)
 
     def in_phantom(self, recording: TimedRecording) -> FloatArray:
         """Tool centres (n, 3) [m], phantom frame."""
@@ -60,7 +73,10 @@ def find_pushes(
     counts: dict[str, int] = {}
     for recording in recordings:
         time = recording.time
-        pushes = _joined(phantom.contacts(recording)[0])
+        pushes = [
+            (push, "" if phantom.is_touch(recording, push) else kind)
+            for push, kind in _joined(phantom.contacts(recording)[0])
+        ]
         for at, (push, kind) in enumerate(pushes):
             if not kind:
                 continue
