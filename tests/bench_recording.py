@@ -14,7 +14,8 @@ __all__ = ["CORNERS", "ROBOT_FROM_PHANTOM", "BenchRecording", "bench_setup"]
 
 RADIUS = 0.005
 START = 1_700_000_000 * 10**9
-CORNERS = np.array([[x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]] for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))])  # fmt: skip
+_SIGNS = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+CORNERS = np.array([[x * SIZE[0] / 2, y * SIZE[1] / 2, SIZE[2]] for x, y in _SIGNS])
 ROBOT_FROM_PHANTOM = (Rotation.from_euler("xyz", [0.3, -0.2, 0.9]), np.array([0.12, -0.05, 0.20]))
 TOP = SIZE[2] + RADIUS
 SIDE = SIZE[0] / 2 + RADIUS
@@ -90,7 +91,7 @@ class BenchRecording:
         """Forces of the sensor (n, 3) [N] in the tool's axes, with weight and zero."""
         turns = Rotation.from_quat(self.motion()[3])
         return np.asarray(
-            turns.inv().apply(self.felt() + [0, 0, -self.weight]) + np.array(self.zero)
+            turns.inv().apply(self.felt() + np.array([0, 0, -self.weight])) + np.array(self.zero)
         )
 
     def image(self, number: int) -> np.ndarray:

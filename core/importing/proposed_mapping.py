@@ -24,7 +24,7 @@ from palpate.importing.stream import Stream
 __all__ = ["proposed_mapping", "recording_name"]
 
 _POSES = (
-    r"(^|/)measured_cp$",
+    r"(?<!local/)\bmeasured_cp$",
     r"position_cartesian_current$",
     r"local/measured_cp$",
     r"#pose$",

@@ -110,7 +110,7 @@ def _take(found: Survey, loose: list[Source], path: Path) -> None:
         raise DatasetError(f"{path} does not exist; expected a recording", file=str(path))
     if path.is_file() and _is_statement(found, path):
         return
-    if path.is_dir() and (path / _SETUP).is_file():
+    if (path / _SETUP).is_file() and (path / "sequences").is_dir():
         _take_dataset(found, path)
         return
     if path.is_dir() and not is_source(path):
