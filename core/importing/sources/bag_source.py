@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from functools import cached_property, partial
 from heapq import merge
@@ -11,20 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag1 import ReaderError as Ros1Error
-from rosbags.rosbag2 import Reader as Ros2Reader
-from rosbags.rosbag2 import ReaderError as Ros2Error
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.importing.messages.message_kinds import KINDS, header_of, nested_transforms
 from palpate.importing.rules import ColumnRules
-from palpate.importing.sources.recovered_mcap import RecoveredMcap
-from palpate.importing.sources.recovered_ros1 import RecoveredRos1
-from palpate.importing.sources.recovered_sqlite import RecoveredSqlite
+from palpate.importing.sources.bag_readers import (
+    BAG_SUFFIXES,
+    BROKEN,
+    open_readers,
+    storage_files,
+    unknown_coding,
+)
 from palpate.importing.stream import Sample, Stream
 
 __all__ = ["BagSource"]
@@ -32,12 +30,6 @@ __all__ = ["BagSource"]
 _TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 _PEEKED = 300
 """Messages of tf that are read to list its frames."""
-_BROKEN = (
-    Ros1Error, Ros2Error, SerdeError, struct.error, RuntimeError, OSError, EOFError, ValueError,
-    AssertionError,
-)  # fmt: skip
-"""Errors of readers at damaged places."""
-_SUFFIXES = {".bag": "ROS 1 bag", ".db3": "ROS 2 sqlite3", ".mcap": "ROS 2 mcap"}
 
 
 class BagSource:
@@ -56,7 +48,8 @@ class BagSource:
         self.has_receipt = True
         self.rules: ColumnRules | None = None
         self._is_ros2 = path.suffix != ".bag"
-        self._readers = self._opened()
+        self._readers, found = open_readers(path)
+        self.warnings.extend(found)
         self._connections = [one for reader in self._readers for one in reader.connections]
         try:
             self._check_coding()
@@ -68,8 +61,8 @@ class BagSource:
     def fits(path: Path) -> bool:
         """Whether a path is such a recording, by its name."""
         if path.is_dir():
-            return (path / "metadata.yaml").is_file() or bool(_bare(path))
-        return path.suffix in _SUFFIXES
+            return (path / "metadata.yaml").is_file() or bool(storage_files(path))
+        return path.suffix in BAG_SUFFIXES
 
     def files(self) -> tuple[Path, ...]:
         """List the files that hold the messages."""
@@ -110,7 +103,7 @@ class BagSource:
                 for sample in self._decoded(connection, received, raw):
                     if sample.stream in names:
                         yield sample
-        except _BROKEN as error:
+        except BROKEN as error:
             text = f"{self.path.name}: damaged after t = {last / 1e9:.3f} s ({error}); what is "
             self.warnings.append(text + "before it was read")
 
@@ -150,7 +143,7 @@ class BagSource:
     def _value(self, connection: Any, raw: bytes, received: int) -> FloatArray:
         try:
             message = self._message(connection.msgtype, raw)
-        except _BROKEN as error:
+        except BROKEN as error:
             raise DatasetError(
                 f"{self.path.name}: a message of {connection.topic} at t = {received / 1e9:.3f} s "
                 f"is no {connection.msgtype} ({error}); expected a whole one",
@@ -199,7 +192,7 @@ class BagSource:
         """Frame id and delay from stamp to receipt [s] of the first message; of any type that
         begins with a header.
         """
-        with suppress(*_BROKEN):
+        with suppress(*BROKEN):
             for connection, received, raw in self.messages({topic}):
                 kind = self._types.types.get(connection.msgtype)
                 if kind is None or next(iter(kind.__dataclass_fields__)) != "header":
@@ -236,105 +229,18 @@ class BagSource:
         last = max((reader.end_time for reader in self._readers), default=0) - 1
         return (first, last) if last >= first else (0, 0)
 
-    def _opened(self) -> list[Any]:
-        """Readers of the file or folder; DatasetError where nothing of it can be read."""
-        if self.path.is_dir() and not (self.path / "metadata.yaml").is_file():
-            self.warnings.append(f"{self.path.name}: has no metadata.yaml; its files were read")
-            return [self._reader(one) for one in _bare(self.path)]
-        try:
-            return [self._whole(self.path)]
-        except Ros2Error as error:
-            if "Serialization format" in str(error):
-                raise self._unknown_coding(str(error)) from None
-            if not self.path.is_dir() or not _bare(self.path):
-                return [self._recovered(self.path, error)]
-            text = f"{self.path.name}: its metadata.yaml is damaged ({error}); its files were read"
-            self.warnings.append(text)
-            return [self._reader(one) for one in _bare(self.path)]
-        except _BROKEN as error:
-            return [self._recovered(self.path, error)]
-
-    def _reader(self, path: Path) -> Any:
-        try:
-            return self._whole(path)
-        except _BROKEN as error:
-            return self._recovered(path, error)
-
-    @staticmethod
-    def _whole(path: Path) -> Any:
-        reader = Ros1Reader(path) if path.suffix == ".bag" else Ros2Reader(path)
-        reader.open()
-        return reader
-
-    def _recovered(self, path: Path, error: BaseException) -> Any:
-        """Read what is whole of a damaged file."""
-        makers: dict[str, Callable[[Path], Any]] = {
-            ".bag": RecoveredRos1,
-            ".mcap": lambda one: _Bare(RecoveredMcap(one)),
-            ".db3": RecoveredSqlite,
-        }
-        if path.suffix in makers and path.is_file():
-            with suppress(*_BROKEN):
-                reader = makers[path.suffix](path)
-                reader.open()
-                if not reader.connections:
-                    reader.close()
-                else:
-                    self.warnings.append(
-                        f"{path.name}: is cut off or damaged ({error}); the whole part was read"
-                    )
-                    return reader
-        raise DatasetError(
-            f"{path.name} cannot be read: {error}; expected a whole recording of ROS: copy it "
-            "again, or record it anew",
-            file=path.name,
-        )
-
     def _check_coding(self) -> None:
         """Refuse empty recordings and unknown serialisation, by name."""
         codings = {
             getattr(one.ext, "serialization_format", "cdr") or "cdr" for one in self._connections
         }
         if unknown := sorted(codings - {"cdr", "ros2msg"}):
-            raise self._unknown_coding(f"Serialization format {unknown} is not supported.")
+            raise unknown_coding(self.path, f"Serialization format {unknown} is not supported.")
         if not any(one.msgcount for one in self._connections):
             raise DatasetError(
                 f"{self.path.name} holds no messages; expected a recording: record it again",
                 file=self.path.name,
             )
-
-    def _unknown_coding(self, found: str) -> DatasetError:
-        return DatasetError(
-            f"{self.path.name}: {found} Expected cdr: convert it by ros2 bag convert where this "
-            "format is installed",
-            file=self.path.name,
-        )
-
-
-class _Bare:
-    """A storage file of rosbags with the stamps that its folder would state."""
-
-    def __init__(self, storage: Any) -> None:
-        self._storage = storage
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._storage, name)
-
-    @property
-    def start_time(self) -> int:
-        """Stamp of the first message [ns]."""
-        return int(self._storage.metadata.start_time)
-
-    @property
-    def end_time(self) -> int:
-        """Stamp after the last message [ns]."""
-        return int(self._storage.metadata.end_time)
-
-
-def _bare(folder: Path) -> list[Path]:
-    """Storage files of ROS 2 in a folder, sorted."""
-    found = (one for one in folder.iterdir() if one.suffix in (".db3", ".mcap"))
-    return sorted(one for one in found if not one.name.startswith("."))
 
 
 def _kind(kind: Any, topic: str, peeked: Sample | None) -> Any:
