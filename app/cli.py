@@ -16,6 +16,7 @@ from palpate.app.commands import (
     doctor,
     evaluation,
     export,
+    importing,
     service,
     surface,
     sweeping,
@@ -39,6 +40,7 @@ app = typer.Typer(
 )
 app.command()(demo.demo)
 app.command()(data.check)
+app.command("import")(importing.import_)
 app.command()(surface.surface)
 app.command()(data.register)
 app.command()(data.replay)

@@ -246,7 +246,7 @@ _KEYS = {
     ),
     "nothing to train on": _key('["poke-01"]', "[]", "splits.train", "at least one"),
     "topics of a bag": _key(
-        "[splits]", "[topics]\npose = '/p'\n[splits]", "topics", "bags are not read yet"
+        "[splits]", "[topics]\npose = '/p'\n[splits]", "topics", "bags are not read in place"
     ),
 }
 

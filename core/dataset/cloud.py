@@ -19,7 +19,7 @@ from palpate.dataset.files import open_inside, problem
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 
-__all__ = ["PlyHeader", "read_cloud", "read_header"]
+__all__ = ["PlyHeader", "read_cloud", "read_header", "read_points"]
 
 _LARGEST_HEADER = 2**14
 _MOST_POINTS = 6_000_000
@@ -95,6 +95,13 @@ def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
     """Read the points (n, 3) [m], n >= 1, camera frame; DatasetError unless all are finite and
     plausible.
     """
+    points = read_points(root, file, within)
+    check_coordinates(file, points, first_row=1)
+    return points
+
+
+def read_points(root: Path, file: str, within: str = "") -> FloatArray:
+    """Read the points (n, 3), n >= 1, whatever their values; DatasetError for a damaged file."""
     with open_inside(root, file, within) as stream:
         size = os.fstat(stream.fileno()).st_size
         header = _header(file, _read(file, stream, _LARGEST_HEADER), size)
@@ -103,13 +110,11 @@ def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
             size - header.start if header.order == "=" else header.count * header.layout.itemsize
         )
         data = _read(file, stream, length)
-    points = (
+    return (
         _ascii_points(file, header, data)
         if header.order == "="
         else _binary_points(file, header, data)
     )
-    check_coordinates(file, points, first_row=1)
-    return points
 
 
 def _read(file: str, stream: Any, length: int) -> bytes:

@@ -195,7 +195,7 @@ def sequence_names(root: Path) -> list[str]:
         if name.endswith(_BAGS):
             raise problem(
                 f"sequences/{name}",
-                "bags are not read yet; expected a folder: export it to csv and ply",
+                "bags are not read in place; expected a folder: run palpate import FOLDER --to NEW",
             )
         if not name.isprintable():
             raise problem(

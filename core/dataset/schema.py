@@ -121,7 +121,7 @@ def read_config(root: Path) -> DatasetConfig:
         raise top.wrong(
             "topics",
             None,
-            "a dataset without it: bags are not read yet, export them to csv and ply",
+            "a dataset without it: bags are not read in place, run palpate import FOLDER --to NEW",
         )
     return DatasetConfig(
         name=top.name("name"),

@@ -14,8 +14,17 @@ from palpate.dataset.folder import Dataset
 from palpate.dataset.sequence import Sequence
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
+from palpate.setup.setup import Box, Shape
 
-__all__ = ["Contact", "ContactKind", "ToolMotion", "describe_motion", "smooth_path"]
+__all__ = [
+    "Contact",
+    "ContactKind",
+    "ToolMotion",
+    "averaged_path",
+    "describe_motion",
+    "find_contacts",
+    "smooth_path",
+]
 
 ContactKind = Literal["top", "side", "drag"]
 
@@ -81,11 +90,7 @@ def describe_motion(
 ) -> ToolMotion:
     """Find the contacts of a sequence by the stated geometry and radius and a registration."""
     time, path = smooth_path(sequence, phantom_from_robot)
-    distance, normals = dataset.geometry.facing(path)
-    gap = distance - dataset.config.tool_radius
-    contacts = tuple(
-        _contact(time[part], path[part], gap[part], normals[part.start]) for part in _episodes(gap)
-    )
+    contacts, gap = find_contacts(dataset.geometry, dataset.config.tool_radius, time, path)
     last_seen = float(sequence.cloud_times[-1] if len(sequence) else time[-1])
     return ToolMotion(
         contacts=contacts,
@@ -98,9 +103,36 @@ def describe_motion(
     )
 
 
+def find_contacts(
+    geometry: Box | Shape, radius: float, time: FloatArray, path: FloatArray
+) -> tuple[tuple[Contact, ...], FloatArray]:
+    """Find the contacts of a ball with a phantom at rest.
+
+    Args:
+        geometry: of the phantom.
+        radius: of the ball [m].
+        time: (n,) [s].
+        path: (n, 3) centres of the ball [m], phantom frame.
+
+    Returns:
+        the contacts in order of time, and the gaps (n,) [m] between ball and phantom.
+    """
+    distance, normals = geometry.facing(path)
+    gap = distance - radius
+    contacts = tuple(
+        _contact(time[part], path[part], gap[part], normals[part.start]) for part in _episodes(gap)
+    )
+    return contacts, gap
+
+
 def smooth_path(sequence: Sequence, phantom_from_robot: Transform) -> tuple[FloatArray, FloatArray]:
     """Times (n,) [s] and tool centres (n, 3) [m], phantom frame, averaged over short steps."""
-    time, points = sequence.kinematics.time, phantom_from_robot.apply(sequence.kinematics.position)
+    kinematics = sequence.kinematics
+    return averaged_path(kinematics.time, phantom_from_robot.apply(kinematics.position))
+
+
+def averaged_path(time: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Average times (n,) [s] and points (n, 3) [m] over steps of 0.05 s."""
     _, index, counts = np.unique(
         np.floor((time - time[0]) / _STEP), return_inverse=True, return_counts=True
     )

@@ -1,0 +1,1 @@
+"""Stamps of header, receipt and device brought to one time line."""

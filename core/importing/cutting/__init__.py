@@ -1,0 +1,1 @@
+"""Cutting of recordings: pushes by kind, rest clouds, touches and splits."""

@@ -1,0 +1,120 @@
+"""The experimenter's statements in an import: dataset.toml, surfaces, touches and traces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.dataset.contact_points import Touches, read_touches, read_traces
+from palpate.dataset.folder import Dataset, stated
+from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError, RegistrationError
+from palpate.importing.cutting.dwells import find_touches
+from palpate.importing.cutting.pushes import LocatedPhantom
+from palpate.importing.import_notes import ImportNotes
+from palpate.importing.mapping_file import toml_text
+from palpate.importing.rules import ImportMapping
+from palpate.importing.timed_recording import TimedRecording
+from palpate.importing.written_dataset import DatasetWriter
+from palpate.registration.robot.robot_statements import robot_fits, touched_centres
+
+__all__ = ["SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
+
+SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "splits")
+"""Tables of dataset.toml that an import takes over."""
+_SURFACES = ("surface", "fixed_surface", "holder")
+
+
+def check_setup(mapping: ImportMapping) -> None:
+    """Refuse a mapping that leaves out what no recording holds."""
+    needed = ["phantom", "tool", *(["camera"] if mapping.streams.cloud else [])]
+    if missing := [name for name in needed if name not in mapping.setup]:
+        tables = ", ".join(f"[{name}]" for name in missing)
+        raise DatasetError(
+            f"{tables} {'is' if len(missing) == 1 else 'are'} not stated, and no recording holds "
+            "this; expected a dataset.toml with these tables by --setup, or [setup.phantom] and so "
+            "on in import.toml: write size, mass, tool radius and camera there",
+            key=f"setup.{missing[0]}",
+        )
+    for name in mapping.setup:
+        if name not in SETUP_TABLES:
+            raise DatasetError(
+                f"setup.{name} is no table of dataset.toml; expected {', '.join(SETUP_TABLES)}",
+                key=f"setup.{name}",
+            )
+
+
+def write_setup(
+    writer: DatasetWriter, mapping: ImportMapping, splits: dict[str, list[str]], base: Path
+) -> None:
+    """Write dataset.toml and copy the files that it names, touches and traces."""
+    values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup, "splits": splits}
+    writer.text("dataset.toml", toml_text(values))
+    home = base / mapping.setup_folder
+    for key in _SURFACES:
+        named = mapping.setup["phantom"].get(key, [])
+        for file in [named] if isinstance(named, str) else named:
+            writer.copied(file, home / file)
+    for file, source in (("touches.csv", mapping.touches), ("traces.csv", mapping.traces)):
+        if source:
+            writer.copied(file, base / source)
+
+
+def found_phantom(
+    writer: DatasetWriter, recordings: list[TimedRecording], notes: ImportNotes
+) -> LocatedPhantom | None:
+    """Relate the phantom to the robot by what was written, or by touches found as dwells.
+
+    Found touches are written to touches.csv. None where nothing relates them, which is said.
+    """
+    root = writer.folder
+    config, geometry = stated(root)
+    none = Touches((), np.zeros((0, 3)))
+    traces = read_traces(root)
+    has_touches = (root / "touches.csv").exists()
+    dataset = Dataset(root, config, none, False, (), geometry, traces)
+    if not has_touches and not len(traces) and config.phantom_from_robot is None:
+        _find_touches(writer, dataset, recordings, notes)
+        has_touches = (root / "touches.csv").exists()
+    touches = read_touches(root, config) if has_touches else none
+    dataset = Dataset(root, config, touches, False, (), geometry, traces)
+    try:
+        fits = robot_fits(dataset)
+    except RegistrationError as error:
+        notes.warn(f"robot and phantom: {error.message}")
+        return None
+    if not fits:
+        notes.warn(
+            "nothing relates robot and phantom: no touches.csv, no traces, no phantom_from_robot, "
+            "and no dwells at the landmarks were found; recordings are not cut into pushes"
+        )
+        return None
+    notes.decide(f"robot and phantom: {fits[0].summary}" if fits[0].summary else "robot: stated")
+    pose = fits[0].phantom_from_robot
+    return LocatedPhantom(geometry, config.tool_radius, pose, touches.positions)
+
+
+def _find_touches(
+    writer: DatasetWriter, dataset: Dataset, recordings: list[TimedRecording], notes: ImportNotes
+) -> None:
+    expected = touched_centres(dataset)
+    places: FloatArray = np.array(list(expected.values())).reshape(-1, 3)
+    found = find_touches(recordings, list(expected), places)
+    if found is None:
+        return
+    text = f"dwells lie as the landmarks do, to {1e3 * found.rms:.2f} mm RMS"
+    if not found.is_clear:
+        notes.warn(
+            f"{text}, the next choice to {1e3 * found.second:.2f} mm: not clear enough to take "
+            "them as touches; write touches.csv, or dwell longer at each landmark in its order"
+        )
+        return
+    at = ", ".join(f"{time:.1f}" for time in found.times)
+    notes.decide(f"touches.csv: {text}, at t = {at} s, in the stated order of landmarks")
+    rows = [
+        f"{name},{x:.9f},{y:.9f},{z:.9f}"
+        for name, (x, y, z) in zip(found.names, found.positions.tolist(), strict=True)
+    ]
+    writer.text("touches.csv", "\n".join(["landmark,x,y,z", *rows]) + "\n")
