@@ -100,7 +100,9 @@ def _tool(centre: FloatArray, axis: FloatArray, random: np.random.Generator) -> 
 def _seen(points: FloatArray, pose: Transform, random: np.random.Generator) -> FloatArray:
     """Points (n, 3) [m] in the camera frame, with noise along the line of sight."""
     seen = pose.inverse().apply(points)
-    return seen * (1 + 6e-4 * random.normal(size=(len(seen), 1)) / np.linalg.norm(seen, axis=1)[:, None])
+    return seen * (
+        1 + 6e-4 * random.normal(size=(len(seen), 1)) / np.linalg.norm(seen, axis=1)[:, None]
+    )
 
 
 def _sequence(

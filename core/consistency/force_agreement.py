@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from palpate.consistency.contact_timeline import named
-from palpate.consistency.felt_motion import FeltMotion, readings
+from palpate.consistency.felt_motion import FeltMotion, Reading, readings
 from palpate.dataset import Dataset, Forces
 from palpate.foundation.frames import Transform
 
@@ -202,25 +202,22 @@ def _clocks(felt: Sequence[FeltMotion]) -> tuple[list[str], list[FeltMotion]]:
 def _directions(felt: Sequence[FeltMotion]) -> Iterator[str]:
     """Sentences about forces that do not push the tool out of the phantom."""
     pressed = [one for one in felt if len(one.pressed) > 4]
-    shares = {}
-    for one in pressed:
-        along, whole = one.along_normal()
-        shares[one.name] = along / max(whole, 1e-30)
+    shares = {one.name: _share(one) for one in pressed}
     if not shares:
         return
     worst = min(shares, key=lambda name: shares[name])
-    stated = _share(pressed)
+    stated = shares[worst]
     best, read = stated, ""
-    for reading in readings():
-        share = _share(pressed, reading)
+    for reading in readings() if stated < ALONG else ():
+        share = min(_share(one, reading) for one in pressed)
         if share > best + 0.02:
             best, read = share, reading.words
-    if stated < ALONG and best > stated + CLEARLY and best > ALONG:
+    if best > stated + CLEARLY and best > ALONG:
         yield (
             f"forces.csv: {stated:.0%} of the force in contact is along the surface's outward "
-            f"normal (over {ALONG:.0%} is expected of the force on the tool), {best:.0%} if the "
-            f"columns are read {read}: the force on the tool in the robot frame is expected, "
-            "convert it"
+            f"normal in {worst} (over {ALONG:.0%} is expected of the force on the tool), in all "
+            f"sequences {best:.0%} or more if the columns are read {read}: the force on the tool "
+            "in the robot frame is expected, convert it"
         )
     elif shares[worst] < LEAST_ALONG:
         bad = [name for name, share in shares.items() if share < LEAST_ALONG]
@@ -232,9 +229,10 @@ def _directions(felt: Sequence[FeltMotion]) -> Iterator[str]:
         )
 
 
-def _share(felt: Sequence[FeltMotion], reading: object = None) -> float:
-    sums = np.array([one.along_normal(reading) for one in felt])  # type: ignore[arg-type]
-    return float(sums[:, 0].sum() / max(sums[:, 1].sum(), 1e-30))
+def _share(felt: FeltMotion, reading: Reading | None = None) -> float:
+    """Share of the force along the outward normal, weighted by its squared length [1]."""
+    along, whole = felt.along_normal(reading)
+    return along / max(whole, 1e-30)
 
 
 def _sizes(dataset: Dataset, felt: Sequence[FeltMotion]) -> Iterator[str]:

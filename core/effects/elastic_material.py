@@ -11,6 +11,7 @@ from palpate.effects.family import STIFFNESS
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
+from palpate.setup.bounds import MODULI
 from palpate.setup.setup import Inclusion, Setup
 
 __all__ = [
@@ -60,7 +61,8 @@ class PoissonRatio(Effect):
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
-        return cls(nu=setup.material.poisson_ratio)
+        low, high = POISSON_BOUNDS
+        return cls(nu=min(max(setup.material.poisson_ratio, low), high))
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
@@ -146,7 +148,9 @@ class YoungModulus(Effect):
     summary = "the material is stiffer or softer than assumed, in all"
     linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.YOUNG_MODULUS
     shown_by = frozenset({Measurement.FORCES})
-    E: float = parameter("Pa", low=10.0, high=1e8, scale=0.15, log=True, accuracy=MODULUS_ACCURACY)
+    E: float = parameter(
+        "Pa", low=10.0, high=MODULI[1], scale=0.15, log=True, accuracy=MODULUS_ACCURACY
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

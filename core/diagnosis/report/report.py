@@ -32,7 +32,8 @@ _NO_CHECKS = AllClearChecks()
 def verdict_of(findings: Findings, checks: AllClearChecks = _NO_CHECKS) -> str:
     """Return the verdict: found, none, ambiguous or unexplained."""
     if findings.best is None:
-        return "unexplained" if findings.structured or checks.failed or findings.poor else "none"
+        unclear = findings.structured or findings.poor or findings.contradicted
+        return "unexplained" if unclear or checks.failed else "none"
     if findings.rivals():
         return "ambiguous"
     return "found"
@@ -293,6 +294,11 @@ def _modulus(
     if not kinds or any(kind.name in named for kind in kinds):
         return [], []
     name = kinds[0].name
+    if findings.contradicted:
+        why = "the measured forces contradict the pushes, so that they fix no modulus"
+        return [], [
+            _unknown(name, why, "the force on the tool again, after palpate check is clear")
+        ]
     model = findings.best.model if findings.best else findings.baseline
     interval = modulus_interval(evaluator, model)
     if interval is None:
