@@ -115,8 +115,8 @@ def _of_another_sequence(folder: Path) -> None:
     paths = [home / "forces.csv" for home in homes(folder)]
     tables = [read_table(path) for path in paths]
     for path, (header, own), (_, other) in zip(paths, tables, tables[1:] + tables[:1], strict=True):
-        other = other - other[0, 0] * np.array([1, 0, 0, 0]) + own[0, 0] * np.array([1, 0, 0, 0])
-        write_table(path, header, other)
+        times = other[:, :1] - other[0, 0] + own[0, 0]
+        write_table(path, header, np.column_stack([times, other[:, 1:]]))
 
 
 def touches(change: Callable[[Table], Table]) -> Change:
@@ -200,7 +200,7 @@ def _landmarks(change: Callable[[Table], Table]) -> Change:
 
 def _turned(degrees: float) -> Change:
     turn = Rotation.from_euler("z", degrees, degrees=True)
-    return _landmarks(lambda places: turn.apply(places))
+    return _landmarks(turn.apply)
 
 
 def toml(pattern: str, replacement: str) -> Change:
@@ -313,70 +313,129 @@ def _without_tool(folder: Path) -> None:
 
 
 DECEPTIONS: dict[str, Deception] = {
-    "forces: sign": Deception("A", _scaled(-1, -1, -1), ""),
-    "forces: sign of z": Deception("A", _scaled(1, 1, -1), ""),
-    "forces: sign of x": Deception("A", _scaled(-1, 1, 1), ""),
-    "forces: y and z swapped": Deception("A", columns(lambda f: f[:, [0, 2, 1]]), ""),
-    "forces: grams": Deception("A", _scaled(*[1e3 / 9.81] * 3), ""),
-    "forces: millinewtons": Deception("A", _scaled(1e3, 1e3, 1e3), ""),
-    "forces: kilograms": Deception("A", _scaled(*[1 / 9.81] * 3), ""),
-    "forces: tool frame": Deception("A", _in_tool_frame, ""),
-    "forces: norm as fz": Deception("A", _norm_along(2), ""),
-    "forces: norm as fx": Deception("A", _norm_along(0), ""),
-    "forces: one value": Deception("A", _constant(0.25), ""),
-    "forces: zero": Deception("A", _constant(0.0), ""),
-    "forces: noise alone": Deception("A", _constant(0.1, 0.005), ""),
-    "forces: 3 s late": Deception("A", stamps(lambda t: t + 3.0), ""),
-    "forces: 2 s early": Deception("A", stamps(lambda t: t - 2.0), ""),
-    "forces: since 1970": Deception("A", stamps(lambda t: t + 1.6e9), ""),
-    "forces: milliseconds": Deception("A", stamps(lambda t: 1e3 * t), ""),
-    "forces: ms from 0": Deception("A", stamps(lambda t: t[0] + 1e3 * (t - t[0])), ""),
-    "forces: first third": Deception("A", forces(lambda rows: rows[: len(rows) // 3]), ""),
-    "forces: last third": Deception("A", forces(lambda rows: rows[-(len(rows) // 3) :]), ""),
-    "forces: another sequence's": Deception("A", _of_another_sequence, ""),
-    "forces: clipped": Deception("A", columns(lambda f: np.clip(f, -0.15, 0.15)), ""),
-    "touches: 25 mm along x": Deception("B", lambda f: _touched_elsewhere(f, (0.025, 0, 0)), ""),
-    "touches: 20 mm along y": Deception("B", lambda f: _touched_elsewhere(f, (0, 0.02, 0)), ""),
-    "touches: 20 mm lower": Deception("B", lambda f: _touched_elsewhere(f, (0, 0, -0.02)), ""),
-    "rest: half missing": Deception("B", _rest(_half_missing), ""),
-    "rest: 90 degrees": Deception("B", _moved_rest((0.03, 0.02, 0), 90.0, table=True), ""),
-    "rest: 30 mm": Deception("B", _moved_rest((0.03, 0.0, 0), 0.0, table=True), ""),
+    "forces: sign": Deception("A", _scaled(-1, -1, -1), r"opposite sign"),
+    "forces: sign of z": Deception("A", _scaled(1, 1, -1), r"sign of fz reversed"),
+    "forces: sign of x": Deception("A", _scaled(-1, 1, 1), r"sign of fx reversed"),
+    "forces: y and z swapped": Deception("A", columns(lambda f: f[:, [0, 2, 1]]), r"as fx, fz, fy"),
+    "forces: grams": Deception("A", _scaled(*[1e3 / 9.81] * 3), r"in grams"),
+    "forces: millinewtons": Deception("A", _scaled(1e3, 1e3, 1e3), r"in millinewtons"),
+    "forces: kilograms": Deception("A", _scaled(*[1 / 9.81] * 3), r"in kilograms"),
+    "forces: tool frame": Deception("A", _in_tool_frame, r"in the tool's frame"),
+    "forces: norm as fz": Deception("A", _norm_along(2), r"changes in fz alone"),
+    "forces: norm as fx": Deception("A", _norm_along(0), r"changes in fx alone"),
+    "forces: one value": Deception("A", _constant(0.25), r"holds one value throughout"),
+    "forces: zero": Deception("A", _constant(0.0), r"holds one value throughout"),
+    "forces: noise alone": Deception("A", _constant(0.1, 0.005), r"does not follow the pushes"),
+    "forces: 3 s late": Deception("A", stamps(lambda t: t + 3.0), r"s late"),
+    "forces: 2 s early": Deception("A", stamps(lambda t: t - 2.0), r"2.00 s early"),
+    "forces: since 1970": Deception(
+        "A", stamps(lambda t: t + 1.6e9), r"expected the same clock and an overlap"
+    ),
+    "forces: milliseconds": Deception(
+        "A", stamps(lambda t: 1e3 * t), r"did you write milliseconds"
+    ),
+    "forces: ms from 0": Deception(
+        "A", stamps(lambda t: t[0] + 1e3 * (t - t[0])), r"in milliseconds"
+    ),
+    "forces: first third": Deception(
+        "A", forces(lambda rows: rows[: len(rows) // 3]), r"covers 0% of the time in contact"
+    ),
+    "forces: last third": Deception(
+        "A", forces(lambda rows: rows[-(len(rows) // 3) :]), r"% of the time in contact"
+    ),
+    "forces: another sequence's": Deception(
+        "A", _of_another_sequence, r"forces.csv of .*(early|late|covers|along|not follow)"
+    ),
+    "forces: clipped": Deception("A", columns(lambda f: np.clip(f, -0.15, 0.15)), r"at its limit"),
+    "touches: 25 mm along x": Deception(
+        "B",
+        lambda f: _touched_elsewhere(f, (0.025, 0, 0)),
+        r"camera sees the tool 26 mm .* by \(\+25",
+    ),
+    "touches: 20 mm along y": Deception(
+        "B", lambda f: _touched_elsewhere(f, (0, 0.02, 0)), r"camera sees the tool 21 mm"
+    ),
+    "touches: 20 mm lower": Deception(
+        "B", lambda f: _touched_elsewhere(f, (0, 0, -0.02)), r"camera sees the tool 2. mm"
+    ),
+    "rest: half missing": Deception("B", _rest(_half_missing), r"camera sees the tool"),
+    "rest: 90 degrees": Deception("B", _moved_rest((0.03, 0.02, 0), 90.0, table=True), r"rest.ply"),
+    "rest: 30 mm": Deception(
+        "B",
+        _moved_rest((0.03, 0.0, 0), 0.0, table=True),
+        r"30 mm and 0 degrees from where rest.ply",
+    ),
     "size: x and y swapped": Deception(
-        "B", toml(r"^size = \[([^,]*), ([^,]*),", r"size = [\2, \1,"), ""
+        "B", toml(r"^size = \[([^,]*), ([^,]*),", r"size = [\2, \1,"), r"x and y swapped"
     ),
-    "clouds: x mirrored": Deception("C", clouds(lambda p: p * np.array([-1, 1, 1])), ""),
-    "clouds: y mirrored": Deception("C", clouds(lambda p: p * np.array([1, -1, 1])), ""),
-    "clouds: x and y swapped": Deception("C", clouds(lambda p: p[:, [1, 0, 2]]), ""),
-    "robot: y mirrored": Deception("C", _mirrored_robot, ""),
-    "rest: phantom 12 mm": Deception("D", _moved_rest((0.012, 0, 0), 0.0), ""),
-    "rest: phantom 12 mm, 10 degrees": Deception("D", _moved_rest((0.009, 0.008, 0), 10.0), ""),
-    "rest: phantom 10 degrees": Deception("D", _moved_rest((0, 0, 0), 10.0), ""),
-    "rest: camera 12 mm": Deception("D", _moved_rest((0.0, 0.012, 0), 0.0, table=True), ""),
-    "rest: camera 5 mm": Deception("D", _moved_rest((0.005, 0.0, 0), 0.0, table=True), ""),
-    "landmarks: 17 mm along x": Deception("E", _landmarks(lambda p: p + [0.017, 0, 0]), ""),
-    "landmarks: 17 mm along y": Deception("E", _landmarks(lambda p: p + [0, 0.017, 0]), ""),
-    "landmarks: 6 mm higher": Deception("E", _landmarks(lambda p: p + [0, 0, 0.006]), ""),
-    "landmarks: 90 degrees": Deception("E", _turned(90.0), ""),
-    "landmarks: 15 % larger": Deception("E", _landmarks(lambda p: 1.15 * p), ""),
-    "landmarks: mirrored": Deception("E", _landmarks(lambda p: p * np.array([-1, 1, 1])), ""),
-    "robot: zeros": Deception("F", poses(lambda r: _spoilt(r, 0.02, np.zeros(3))), ""),
-    "robot: jump": Deception("F", poses(lambda r: _spoilt(r, 0.005, None, 0.02), 0), ""),
-    "robot: frozen": Deception("F", poses(lambda r: _frozen(r, 0.3, 6.0), 0), ""),
-    "robot: frozen with noise": Deception("F", poses(lambda r: _frozen(r, 0.3, 6.0, 5e-5), 0), ""),
-    "camera: every second repeated": Deception("F", _repeated(2), ""),
-    "camera: every fifth repeated": Deception("F", _repeated(5), ""),
-    "camera: frozen": Deception("F", _stuck_camera, ""),
-    "camera: 1 % fast": Deception("F", _cloud_stamps(lambda t, _: t[0] + 1.01 * (t - t[0])), ""),
-    "camera: 4 % slow": Deception("F", _cloud_stamps(lambda t, _: t[0] + 0.96 * (t - t[0])), ""),
+    "clouds: x mirrored": Deception(
+        "C", clouds(lambda p: p * np.array([-1, 1, 1])), r"is mirrored"
+    ),
+    "clouds: y mirrored": Deception(
+        "C", clouds(lambda p: p * np.array([1, -1, 1])), r"is mirrored"
+    ),
+    "clouds: x and y swapped": Deception("C", clouds(lambda p: p[:, [1, 0, 2]]), r"is mirrored"),
+    "robot: y mirrored": Deception("C", _mirrored_robot, r"is mirrored|wrong landmarks"),
+    "rest: phantom 12 mm": Deception(
+        "D", _moved_rest((0.012, 0, 0), 0.0), r"12 mm and 0 degrees from where rest.ply"
+    ),
+    "rest: phantom 12 mm, 10 degrees": Deception(
+        "D", _moved_rest((0.009, 0.008, 0), 10.0), r"10 degrees from where rest.ply"
+    ),
+    "rest: phantom 10 degrees": Deception(
+        "D", _moved_rest((0, 0, 0), 10.0), r"10 degrees from where rest.ply"
+    ),
+    "rest: camera 12 mm": Deception(
+        "D",
+        _moved_rest((0.0, 0.012, 0), 0.0, table=True),
+        r"12 mm and 0 degrees from where rest.ply",
+    ),
+    "landmarks: 17 mm along x": Deception(
+        "E",
+        _landmarks(lambda p: p + np.array([0.017, 0, 0])),
+        r"if they are moved by \(-17.0, \+0.0, \+0.0\) mm",
+    ),
+    "landmarks: 17 mm along y": Deception(
+        "E",
+        _landmarks(lambda p: p + np.array([0, 0.017, 0])),
+        r"if they are moved by \(\+0.0, -17.0, \+0.0\) mm",
+    ),
+    "landmarks: 6 mm higher": Deception(
+        "E", _landmarks(lambda p: p + np.array([0, 0, 0.006])), r"if they are moved by"
+    ),
+    "landmarks: 90 degrees": Deception("E", _turned(90.0), r"turned by 90 degrees"),
+    "landmarks: 15 % larger": Deception(
+        "E", _landmarks(lambda p: 1.15 * p), r"multiplied by 0.8[67]"
+    ),
+    "landmarks: mirrored": Deception(
+        "E", _landmarks(lambda p: p * np.array([-1, 1, 1])), r"wrong landmarks"
+    ),
+    "robot: zeros": Deception("F", poses(lambda r: _spoilt(r, 0.02, np.zeros(3))), r"jumps"),
+    "robot: jump": Deception("F", poses(lambda r: _spoilt(r, 0.005, None, 0.02), 0), r"jumps"),
+    "robot: frozen": Deception("F", poses(lambda r: _frozen(r, 0.3, 6.0), 0), r"stands still"),
+    "robot: frozen with noise": Deception(
+        "F", poses(lambda r: _frozen(r, 0.3, 6.0, 5e-5), 0), r"the stream of the robot stood still"
+    ),
+    "camera: every second repeated": Deception("F", _repeated(2), r"byte for byte"),
+    "camera: every fifth repeated": Deception("F", _repeated(5), r"byte for byte"),
+    "camera: frozen": Deception("F", _stuck_camera, r"byte for byte"),
+    "camera: 1 % fast": Deception(
+        "F", _cloud_stamps(lambda t, _: t[0] + 1.01 * (t - t[0])), r"% fast"
+    ),
+    "camera: 4 % slow": Deception(
+        "F", _cloud_stamps(lambda t, _: t[0] + 0.96 * (t - t[0])), r"% slow"
+    ),
     "camera: an offset each": Deception(
-        "F", _cloud_stamps(lambda t, n: t + (0.0, 0.8, -0.6, 0.3)[n % 4]), ""
+        "F",
+        _cloud_stamps(lambda t, n: t + (0.0, 0.8, -0.6, 0.3)[n % 4]),
+        r"another time in each sequence",
     ),
-    "camera: 2 s late": Deception("F", _cloud_stamps(lambda t, _: t + 2.0), ""),
-    "quaternions: w first": Deception("G", poses(_w_first), ""),
-    "quaternions: inverse": Deception("G", poses(_conjugated), ""),
-    "clouds: tool masked": Deception("G", _without_tool, ""),
-    "mass: 20 700 kg/m3": Deception("H", toml(r"^mass = .*", "mass = 2.0"), ""),
-    "mass: in tonnes": Deception("H", toml(r"^mass = .*", "mass = 0.0001"), ""),
-    "radius: 0.4 mm": Deception("H", toml(r"^radius = .*", "radius = 0.0004"), ""),
-    "radius: 40 mm": Deception("H", toml(r"^radius = .*", "radius = 0.04"), ""),
+    "camera: 2 s late": Deception("F", _cloud_stamps(lambda t, _: t + 2.0), r"2.00 s late"),
+    "quaternions: w first": Deception("G", poses(_w_first), r"qw in the first"),
+    "quaternions: inverse": Deception("G", poses(_conjugated), r"inverted"),
+    "clouds: tool masked": Deception("G", _without_tool, r"no tool is seen"),
+    "mass: 20 700 kg/m3": Deception("H", toml(r"^mass = .*", "mass = 2.0"), r"kg/m3"),
+    "mass: in tonnes": Deception("H", toml(r"^mass = .*", "mass = 0.0001"), r"kg/m3"),
+    "radius: 0.4 mm": Deception("H", toml(r"^radius = .*", "radius = 0.0004"), r""),
+    "radius: 40 mm": Deception("H", toml(r"^radius = .*", "radius = 0.04"), r"ball of 80 mm"),
 }

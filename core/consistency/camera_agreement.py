@@ -77,7 +77,7 @@ def camera_doubts(seen: Sequence[SeenTool]) -> tuple[tuple[str, ...], bool]:
     late = list(_clock_doubts(clocks, usable))
     doubt = _place_doubt(usable, clocks)
     places = [doubt.sentence] if doubt else []
-    return (*places, *(late or ([] if places else _stuck(usable)))), bool(places)
+    return tuple(places or late or _stuck(usable)), bool(places)
 
 
 def _misfit(apart: FloatArray) -> float:

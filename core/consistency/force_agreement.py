@@ -19,8 +19,9 @@ in doubt [1]."""
 SATURATED = 0.03
 """Share of samples at exactly the largest value from which a sensor is taken to be at its limit
 [1]; noise repeats its largest value once."""
-COVERED = 0.6
-"""Least share of the time in contact with known force [1]."""
+COVERED, LEAST_COVERED = 0.6, 0.5
+"""Least share of the time in contact with known force [1], and least one by which the forces are
+judged."""
 LATE, LATER = 0.25, 0.1
 """Shift of the clock [s], and share of variance [1] that it adds, from which it is told. Soft
 materials relax over seconds, which moves the best shift by less."""
@@ -167,7 +168,7 @@ def _clocks(felt: Sequence[FeltMotion]) -> tuple[list[str], list[FeltMotion]]:
     strange: dict[str, float] = {}
     sound = []
     for one in felt:
-        if one.covered < 0.3:
+        if one.covered < LEAST_COVERED:
             continue
         now, best, shift = one.follows()
         if best < FOLLOWS:

@@ -10,7 +10,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RegistrationError
 from palpate.foundation.frames import Transform
 from palpate.registration.registration import Registration
-from palpate.registration.rest_fit import refine_rest_cloud
+from palpate.registration.rest_fit import nearest_rest_pose
 
 __all__ = ["rest_doubts"]
 
@@ -74,10 +74,10 @@ def _motion(dataset: Dataset, cloud: FloatArray, pose: Transform) -> tuple[float
     none is found.
     """
     try:
-        fit = refine_rest_cloud(cloud, dataset.geometry, pose, dataset.config.depth_sigma)
+        found = nearest_rest_pose(cloud, dataset.geometry, pose, dataset.config.depth_sigma)
     except RegistrationError:
         return None
-    motion = fit.phantom_from_camera @ pose.inverse()
+    motion = found @ pose.inverse()
     middle = 0.5 * (dataset.geometry.low + dataset.geometry.high)
     way = float(np.linalg.norm(motion.apply(middle[None])[0] - middle))
     return way, float(np.linalg.norm(motion.rotation_vector))

@@ -36,6 +36,7 @@ def stream_doubts(dataset: Dataset) -> tuple[str, ...]:
         *_told_jumps(jumps, len(names)),
         *_told_frozen(still, len(names)),
         *_told_repeats(same, dataset),
+        *_left_out(dataset),
     )
 
 
@@ -117,6 +118,19 @@ def _mark(dataset: Dataset, file: str) -> bytes:
         size = stream.seek(0, 2)
         stream.seek(max(0, size - _TAIL))
         return hashlib.blake2b(b"%d " % size + stream.read(), digest_size=16).digest()
+
+
+def _left_out(dataset: Dataset) -> Iterator[str]:
+    """Tell of points that were left out on reading, by the first cloud of each sequence."""
+    for name in dataset.sequences:
+        sequence = dataset.sequence(name)
+        if len(sequence) and (far := sequence.count(0) - len(sequence.cloud(0))):
+            yield (
+                f"{far} of {sequence.count(0)} points of {sequence.cloud_files[0]} lie more than "
+                "10 m away and are left out, as others may be: is 65.535 m the camera's mark of a "
+                "pixel without depth? Leave such pixels out of the clouds"
+            )
+            return
 
 
 def _told_repeats(same: dict[str, tuple[int, str]], dataset: Dataset) -> Iterator[str]:

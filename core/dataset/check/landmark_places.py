@@ -1,4 +1,4 @@
-"""Landmarks against the stated surface: off it, and which turn, mirror, scale or shift puts them on.
+"""Landmarks off the stated surface, and which turn, mirror, scale or shift puts them on it.
 
 The touches agree with landmarks that were moved or turned as a whole, so that only the surface
 shows it.
