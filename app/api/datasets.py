@@ -25,6 +25,7 @@ from palpate.app.schemas import JobOut
 from palpate.app.services import ONE_WHOLE_READ, CurrentServices, IdempotencyKey, Services
 from palpate.app.storage.archive_reader import is_archive
 from palpate.app.storage.dataset_import import UPLOADS, check_name
+from palpate.consistency import check_consistency
 from palpate.dataset.check import check_dataset
 from palpate.foundation.errors import DatasetError, PalpateError
 
@@ -74,7 +75,7 @@ def check(name: str, services: CurrentServices) -> dict[str, Any]:
     summary = check_dataset(dataset)
     return {
         **dataset_summary(dataset),
-        "warnings": list(summary.warnings),
+        "warnings": [*summary.warnings, *check_consistency(dataset, None)],
         "lacks": [lack.sentence for lack in summary.lacks],
     }
 

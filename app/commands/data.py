@@ -222,6 +222,7 @@ def _print_mesh_errors(frames: Sequence[Equilibrium], errors: Sequence[MeshError
 
 
 def _check_one(path: Path, picture: Path | None) -> None:
+    from palpate.consistency import check_consistency
     from palpate.dataset import open_dataset
     from palpate.dataset.check import check_dataset
     from palpate.measurement.phantom_drift import align_sequences
@@ -236,10 +237,12 @@ def _check_one(path: Path, picture: Path | None) -> None:
             warnings = align_sequences(dataset, registration)[1].warnings
         except RegistrationError as error:
             warnings = (error.message,)
+        warnings = (*warnings, *check_consistency(dataset, registration))
         summary = check_dataset(
             dataset,
             registration.phantom_from_robot if registration else None,
             part(report, 0.6, 1.0),
+            was_read=True,
         )
     _print_summary(dataset, summary, registration)
     print_warnings((*summary.warnings, *warnings))

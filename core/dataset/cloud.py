@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from palpate.dataset.csv_table import check_coordinates
+from palpate.dataset.csv_table import LARGEST_COORDINATE, check_coordinates
 from palpate.dataset.files import open_inside, problem
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
@@ -26,6 +26,9 @@ _MOST_POINTS = 6_000_000
 """Of one cloud: depth cameras give up to five million."""
 _MOST_BYTES = 2**28
 """Largest size of a file [bytes]; six million points as text take less."""
+_MOST_FAR = 0.1
+"""Largest share of points beyond the farthest plausible place that are left out [1]; of more, the
+unit is wrong."""
 _TYPES = {
     "char": "i1",
     "int8": "i1",
@@ -94,8 +97,14 @@ def read_header(root: Path, file: str, within: str = "") -> PlyHeader:
 def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
     """Read the points (n, 3) [m], n >= 1, camera frame; DatasetError unless all are finite and
     plausible.
+
+    Few points beyond 10 m are left out: a camera marks depths that it could not measure by its
+    largest number, 65.535 m where it counts millimetres in 16 bits.
     """
     points = read_points(root, file, within)
+    far = np.isfinite(points).all(axis=1) & (np.abs(points) > LARGEST_COORDINATE).any(axis=1)
+    if 0 < far.sum() <= _MOST_FAR * len(points):
+        points = points[~far]
     check_coordinates(file, points, first_row=1)
     return points
 
@@ -167,16 +176,14 @@ def _header_text(file: str, data: bytes) -> tuple[list[str], int]:
             "has no end_header line; expected a whole PLY header: the file is cut off or "
             "damaged, export it again",
         )
-    try:
-        text = data[:end].decode("ascii")
-    except UnicodeDecodeError:
+    # A comment may hold any characters; Latin-1 decodes every byte.
+    lines = data[:end].decode("latin-1").split(newline.decode())
+    if not all(line.isascii() or line.startswith(("comment", "obj_info")) for line in lines):
         raise problem(
             file,
             "has more than plain characters in its header; expected ASCII there: export it again",
-        ) from None
-    return text.split("\r\n" if newline == b"\r\n" else "\n"), end + len(newline) * 2 + len(
-        b"end_header"
-    )
+        )
+    return lines, end + len(newline) * 2 + len(b"end_header")
 
 
 def _elements(file: str, lines: list[str]) -> tuple[_Order, list[_Element]]:

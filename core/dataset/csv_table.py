@@ -122,10 +122,16 @@ def check_increasing(file: str, time: FloatArray) -> None:
     if len(bad):
         at = int(bad[0])
         before, after = repr(float(time[at])), repr(float(time[at + 1]))
-        text = (
-            f"t = {after} s does not increase (row {at + FIRST_ROW}: {before} s); sort the "
-            "rows by time and keep each stamp once"
-        )
+        told = f"t = {after} s does not increase (row {at + FIRST_ROW}: {before} s)"
+        steps = np.diff(time)
+        if before == after and (steps >= 0).all():
+            text = (
+                f"{told}; {(steps == 0).sum()} of {len(time)} stamps repeat the one before: were "
+                "they written with too few digits, as %g writes six? Write all digits, and keep "
+                "each stamp once"
+            )
+        else:
+            text = f"{told}; sort the rows by time and keep each stamp once"
         raise problem(file, text, row=at + 1 + FIRST_ROW, key="t", value=after)
 
 

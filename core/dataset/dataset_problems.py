@@ -96,7 +96,8 @@ def _sequence(root: Path, name: str, config: DatasetConfig | None, seen: _Found)
         return
     seen.all(row_problems(root, clouds, CLOUDS, label=1))
     try:
-        files = read_labelled(root, clouds, CLOUDS, label=1)[0]
+        listed = read_labelled(root, clouds, CLOUDS, label=1)[0]
+        files = [file.replace("\\", "/") for file in listed]
     except DatasetError:
         files = []  # listed above
     for file in dict.fromkeys(files):

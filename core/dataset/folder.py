@@ -32,6 +32,8 @@ __all__ = [
 ]
 
 _BAGS = (".bag", ".db3", ".mcap")
+_NOT_SEQUENCES = (".", "@", "#", "$", "__MACOSX")
+"""Beginnings of the names of folders that file servers and archivers add."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +185,7 @@ def sequence_names(root: Path) -> list[str]:
         entries = sorted(
             (entry.name, entry.is_dir())
             for entry in (root / "sequences").iterdir()
-            if not entry.name.startswith(".")
+            if not entry.name.startswith(_NOT_SEQUENCES)
         )
     except OSError as error:
         text = (

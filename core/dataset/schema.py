@@ -17,6 +17,7 @@ from palpate.dataset.statements.shape_statement import (
 )
 from palpate.dataset.statements.stated_pose import StatedPose, read_stated_pose
 from palpate.foundation.frames import Transform
+from palpate.setup.bounds import MODULI, POISSON_RATIOS, TOOL_RADII
 from palpate.setup.depth_filters import DEPTH_FILTERS
 
 __all__ = ["DatasetConfig", "read_config"]
@@ -149,8 +150,8 @@ def _phantom(keys: Keys) -> dict[str, Any]:
         "mass": keys.number("mass", 1e-5, 50.0, "kg"),
         "height_sigma": _sigma(keys, "height_sigma"),
         "fixed": shape.held_by if other else keys.choice("fixed", "base", why),
-        "young_modulus": keys.number("young_modulus", 50.0, 1e9, "Pa", default=5.0e3),
-        "poisson_ratio": keys.number("poisson_ratio", -0.5, 0.4999, "", default=0.45),
+        "young_modulus": keys.number("young_modulus", *MODULI, "Pa", default=5.0e3),
+        "poisson_ratio": keys.number("poisson_ratio", *POISSON_RATIOS, "", default=0.45),
     }
 
 
@@ -178,7 +179,7 @@ def _geometry(keys: Keys) -> dict[str, Any]:
 def _tool(keys: Keys) -> float:
     keys.only(("shape", "radius"))
     keys.choice("shape", "sphere", "only a sphere is supported")
-    return keys.number("radius", 1e-4, 0.2, "m")
+    return keys.number("radius", *TOOL_RADII, "m")
 
 
 def _landmarks(keys: Keys) -> dict[str, Any]:

@@ -140,9 +140,28 @@ def read_sequence(root: Path, name: str) -> Sequence:
             home,
             "has neither clouds.csv nor forces.csv; expected at least one: add what was measured",
         )
-    return Sequence(
-        root, name, kinematics, times, files, read_forces(root, forces) if has_forces else None
+    felt = read_forces(root, forces) if has_forces else None
+    if felt is not None:
+        _check_overlap(forces, felt.time, kinematics.time)
+    return Sequence(root, name, kinematics, times, files, felt)
+
+
+def _check_overlap(file: str, time: FloatArray, clock: FloatArray) -> None:
+    """Refuse forces of another time than the kinematics: none of them could be used."""
+    if time[-1] >= clock[0] and time[0] <= clock[-1]:
+        return
+    units = {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
+    fits = [
+        unit
+        for unit, second in units.items()
+        if second * time[-1] >= clock[0] and second * time[0] <= clock[-1]
+    ]
+    hint = f"did you write {fits[0]}?" if fits else "convert the stamps to one clock"
+    text = (
+        f"forces from t = {time[0]:.3f} to {time[-1]:.3f} s, kinematics from {clock[0]:.3f} to "
+        f"{clock[-1]:.3f} s; expected the same clock and an overlap: {hint}"
     )
+    raise problem(file, text, row=FIRST_ROW, key="t", value=f"{time[0]:.3f}")
 
 
 def read_kinematics(root: Path, file: str) -> Kinematics:
@@ -190,12 +209,13 @@ def read_cloud_list(
         stamps (m,) [s] and files, relative to `root`.
     """
     names, numbers = read_labelled(root, file, CLOUDS, label=1)
+    names = [name.replace("\\", "/") for name in names]
     times = numbers[:, 0]
     check_increasing(file, times)
     seen: dict[str, int] = {}
     for row, name in enumerate(names, FIRST_ROW):
         path = PurePosixPath(name)
-        if path.is_absolute() or ".." in path.parts or "\\" in name or not name.isprintable():
+        if path.is_absolute() or ".." in path.parts or not name.isprintable():
             text = (
                 f"file = '{name[:80]}' leads out of the sequence; expected a path inside such "
                 "as clouds/000000.ply: move it there"

@@ -43,6 +43,7 @@ from palpate.diagnosis.report.supplements import with_supplements
 from palpate.diagnosis.search.findings import Findings
 from palpate.diagnosis.search.forward_selection import search
 from palpate.diagnosis.validation.checks import AllClearChecks
+from palpate.diagnosis.validation.force_contradiction import force_contradiction
 from palpate.diagnosis.validation.held_out_check import check_held_out
 from palpate.diagnosis.validation.held_out_evidence import gain_on_held_out
 from palpate.diagnosis.validation.rejection import rejection_reason
@@ -224,6 +225,10 @@ def _validated(
     stated = as_stated(evaluator, findings.best.model) if findings.best else ()
     if why := rejection_reason(findings, gain, stated):
         findings.withdraw(why)
+        gain = held_out_gain(evaluator, findings, held_out, pool, fine, seed) if held_out else None
+    last = findings.best.model if findings.best else findings.baseline
+    if why := force_contradiction(findings.baseline, last):
+        findings.contradict(why)
         gain = held_out_gain(evaluator, findings, held_out, pool, fine, seed) if held_out else None
     if verdict_of(findings) != "none":
         return gain, AllClearChecks(tolerance=options.tolerance)

@@ -13,6 +13,7 @@ from palpate.effects.family import STIFFNESS
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
+from palpate.setup.bounds import MODULI
 from palpate.setup.phantom_geometry import Geometry
 from palpate.setup.setup import Inclusion, Setup
 
@@ -49,9 +50,7 @@ def inclusion_grid(setup: Setup) -> tuple[Inclusion, ...]:
     if not body.is_block:
         inside = body.outside(np.array(grid)) < 0
         grid = [place for place, kept in zip(grid, inside, strict=True) if kept] or grid
-    return tuple(
-        Inclusion(x=x, y=y, z=z, radius=7e-3, stiffness_ratio=5.0) for x, y, z in grid
-    )
+    return tuple(Inclusion(x=x, y=y, z=z, radius=7e-3, stiffness_ratio=5.0) for x, y, z in grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +67,8 @@ class PoissonRatio(Effect):
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:
-        return cls(nu=setup.material.poisson_ratio)
+        low, high = POISSON_BOUNDS
+        return cls(nu=min(max(setup.material.poisson_ratio, low), high))
 
     @classmethod
     def starts(cls, setup: Setup) -> Sequence[Self]:
@@ -162,7 +162,9 @@ class YoungModulus(Effect):
     summary = "the material is stiffer or softer than assumed, in all"
     linearisation, nuisance = Linearisation.NUISANCE, NuisanceBlock.YOUNG_MODULUS
     shown_by = frozenset({Measurement.FORCES})
-    E: float = parameter("Pa", low=10.0, high=1e8, scale=0.15, log=True, accuracy=MODULUS_ACCURACY)
+    E: float = parameter(
+        "Pa", low=10.0, high=MODULI[1], scale=0.15, log=True, accuracy=MODULUS_ACCURACY
+    )
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -13,19 +13,10 @@ from palpate.effects.family import TOOL
 from palpate.effects.linearisation import Linearisation, Measurement, NuisanceBlock
 from palpate.effects.parameter import parameter
 from palpate.foundation.quantities import quantity
+from palpate.setup.bounds import TOOL_RADII
 from palpate.setup.setup import PAIRINGS, Setup
 
-__all__ = [
-    "RADIUS_BOUNDS",
-    "LandmarkMismatch",
-    "ToolCompliance",
-    "ToolFriction",
-    "ToolOffset",
-    "ToolRadius",
-]
-
-RADIUS_BOUNDS = (1e-3, 2e-2)
-"""Radii that a tool can have [m]."""
+__all__ = ["LandmarkMismatch", "ToolCompliance", "ToolFriction", "ToolOffset", "ToolRadius"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +31,7 @@ class ToolRadius(Effect):
     # Measured: for a ball of 3.4 mm that is stated to have 5 mm the linear gain is 14 nats, that of
     # a compliant tool 282.
     strongly_nonlinear = True
-    radius: float = parameter(
-        "m", low=RADIUS_BOUNDS[0], high=RADIUS_BOUNDS[1], scale=3e-4, accuracy=5e-5
-    )
+    radius: float = parameter("m", low=TOOL_RADII[0], high=TOOL_RADII[1], scale=3e-4, accuracy=5e-5)
 
     @classmethod
     def neutral(cls, setup: Setup) -> Self:

@@ -16,6 +16,7 @@ from typing import Self
 
 import numpy as np
 
+from palpate.consistency import check_consistency
 from palpate.dataset import Dataset, Sequence, open_dataset
 from palpate.dataset.accepted_registration import AcceptedRegistration
 from palpate.dataset.tool_smoothing import smooth_centres
@@ -85,7 +86,10 @@ class Experiment:
     @classmethod
     def registered(cls, dataset: Dataset, registration: Registration) -> Self:
         """The experiment of a dataset whose registration is known already."""
+        contradictions = check_consistency(dataset, registration)
         aligned, registration = align_sequences(dataset, registration)
+        warnings = (*registration.warnings, *contradictions)
+        registration = replace(registration, warnings=warnings)
         return cls(aligned, registration, setup_from(aligned, registration))
 
     @property

@@ -10,13 +10,17 @@ from dataclasses import replace
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.frames import Transform
-from palpate.registration.camera.block_fit import fit_camera, refine_camera
+from palpate.registration.camera.block_fit import fit_camera, nearest_pose, refine_camera
 from palpate.registration.camera.camera_fit import CameraFit
 from palpate.registration.camera.heading import turned_fit
-from palpate.registration.shape.shape_fit import fit_shape_camera, refine_shape_camera
+from palpate.registration.shape.shape_fit import (
+    fit_shape_camera,
+    nearest_shape_pose,
+    refine_shape_camera,
+)
 from palpate.setup.phantom_geometry import Geometry
 
-__all__ = ["fit_rest_cloud", "refine_rest_cloud"]
+__all__ = ["fit_rest_cloud", "nearest_rest_pose", "refine_rest_cloud"]
 
 
 def fit_rest_cloud(
@@ -48,3 +52,16 @@ def refine_rest_cloud(
     if geometry.is_block:
         return refine_camera(cloud, geometry.size, start, depth_sigma)
     return refine_shape_camera(cloud, geometry, start, depth_sigma)
+
+
+def nearest_rest_pose(
+    cloud: FloatArray, geometry: Geometry, start: Transform, depth_sigma: float
+) -> Transform:
+    """Find the pose next to `start` (phantom_from_camera) in which a raw cloud of the untouched
+    phantom shows it, without its uncertainty.
+
+    Args and errors are those of `fit_rest_cloud`.
+    """
+    if geometry.is_block:
+        return nearest_pose(cloud, geometry.size, start, depth_sigma)
+    return nearest_shape_pose(cloud, geometry, start, depth_sigma)

@@ -6,7 +6,14 @@ import math
 
 from palpate.foundation.errors import SetupError
 
-__all__ = ["require_within"]
+__all__ = ["MODULI", "POISSON_RATIOS", "TOOL_RADII", "require_within"]
+
+TOOL_RADII = (1e-4, 0.2)
+"""Radii that a tool can have, as stated or as found [m]."""
+MODULI = (50.0, 1e9)
+"""Young's moduli that a phantom can be stated to have [Pa]."""
+POISSON_RATIOS = (-0.5, 0.4999)
+"""Poisson's ratios that a phantom can have [1]."""
 
 
 def require_within(key: str, value: float, low: float, high: float, unit: str) -> None:

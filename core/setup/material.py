@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 from palpate.foundation.errors import SetupError
-from palpate.setup.bounds import require_within
+from palpate.setup.bounds import POISSON_RATIOS, require_within
 
 __all__ = [
     "AnyInclusion",
@@ -174,7 +174,7 @@ class Material:
 
     def __post_init__(self) -> None:
         require_within("young_modulus", self.young_modulus, 1.0, 1e9, "Pa")
-        require_within("poisson_ratio", self.poisson_ratio, -0.5, 0.4999, "")
+        require_within("poisson_ratio", self.poisson_ratio, *POISSON_RATIOS, "")
         require_within("log_ratio", self.log_ratio, -7.0, 7.0, "")
         if self.stretch_limit is not None:
             require_within("stretch_limit", self.stretch_limit, 0.1, 1e6, "")

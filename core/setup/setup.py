@@ -13,7 +13,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import SetupError
 from palpate.foundation.frames import Transform
-from palpate.setup.bounds import require_within
+from palpate.setup.bounds import TOOL_RADII, require_within
 from palpate.setup.box import Box
 from palpate.setup.free_form.cast_modes import cast_modes, check_cast
 from palpate.setup.free_form.cast_surface import CastSurface
@@ -123,7 +123,7 @@ class Tool:
     friction_coefficient: float = 0.0
 
     def __post_init__(self) -> None:
-        require_within("tool radius", self.radius, 1e-4, 0.2, "m")
+        require_within("tool radius", self.radius, *TOOL_RADII, "m")
         require_within(
             "tool compliance_times_stiffness", self.compliance_times_stiffness, 0.0, 1e3, "1/m"
         )

@@ -104,10 +104,22 @@ class DatasetSummary:
 
 
 def check_dataset(
-    dataset: Dataset, phantom_from_robot: Transform | None = None, report: Report = silent
+    dataset: Dataset,
+    phantom_from_robot: Transform | None = None,
+    report: Report = silent,
+    *,
+    was_read: bool = False,
 ) -> DatasetSummary:
-    """Read a whole dataset and sum it up, with a registration of the robot also its motions."""
-    dataset.validate(part(report, 0.0, 0.9))
+    """Read a whole dataset and sum it up, with a registration of the robot also its motions.
+
+    Args:
+        dataset: as opened.
+        phantom_from_robot: None without a registration.
+        report: progress.
+        was_read: whether `Dataset.validate` read every cloud before.
+    """
+    if not was_read:
+        dataset.validate(part(report, 0.0, 0.9))
     summaries = []
     for index, name in enumerate(dataset.sequences):
         report(0.9 + 0.1 * index / len(dataset.sequences), f"looking at {name}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.dataset.check.landmark_places import off_surface
 from palpate.dataset.schema import DatasetConfig
 from palpate.setup.phantom_geometry import Geometry
 
@@ -20,9 +21,6 @@ OFFSET = 3.0
 DEEPEST = 0.8
 """Largest diameter of the tool over the phantom's smallest extent [1]: a larger ball meets the
 support before it dents the phantom as it dents a thick one."""
-
-OFF_SURFACE = 1e-2
-"""Largest distance of a landmark from the phantom's surface [m]."""
 
 
 def implausible_values(config: DatasetConfig, body: Geometry) -> list[str]:
@@ -58,15 +56,7 @@ def implausible_values(config: DatasetConfig, body: Geometry) -> list[str]:
             f"{1e3 * config.tool_radius:g} mm radius that touches a landmark is within "
             f"{OFFSET:g} radii of it: is it the height of the ball's centre, in metres?"
         )
-    names = list(config.landmarks)
-    apart, _ = body.facing(np.array([config.landmarks[name] for name in names]).reshape(-1, 3))
-    for row in np.flatnonzero(np.abs(apart) > OFF_SURFACE)[:1]:
-        doubts.append(
-            f"landmarks.{names[row]} lies {1e3 * abs(apart[row]):.3g} mm from the phantom's "
-            f"surface, as {(np.abs(apart) > OFF_SURFACE).sum()} of {len(names)} landmarks do by "
-            f"more than {1e3 * OFF_SURFACE:g} mm: is it in the phantom's frame, and of this "
-            "surface?"
-        )
+    doubts += off_surface(config, body)
     return doubts
 
 

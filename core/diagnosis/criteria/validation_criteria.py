@@ -77,6 +77,13 @@ class RejectionCriteria:
         "29 % (23 to 47 %) and a quarter of the structure; where a cause was rightly named, "
         "nothing significant was left, or less than a seventh",
     )
+    felt: float = threshold(
+        3.0,
+        "1",
+        "Stated forces whose RMS is below this many times the sensor's noise cannot contradict a "
+        "verdict.",
+    )
+    least_forces: int = threshold(4, "1", "Fewer forces than this cannot contradict a verdict.")
 
 
 @dataclass(frozen=True, kw_only=True)

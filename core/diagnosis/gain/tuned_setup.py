@@ -11,8 +11,8 @@ from palpate.diagnosis.inference.evidence import fit
 from palpate.diagnosis.inference.hypothesis import Model
 from palpate.effects import NuisanceBlock
 from palpate.effects.elastic_material import POISSON_BOUNDS
-from palpate.effects.tool import RADIUS_BOUNDS
 from palpate.registration.pose import small_motion
+from palpate.setup.bounds import TOOL_RADII
 from palpate.setup.setup import Setup
 
 __all__ = ["tuned_setup"]
@@ -37,7 +37,7 @@ def tuned_setup(evaluator: Evaluator, model: Model) -> Setup:
         small_motion(change[list(motion)], problem.registration.robot_pivot)
         @ setup.phantom_from_robot
     )
-    radius = float(np.clip(setup.tool.radius + float(change[wider]), *RADIUS_BOUNDS))
+    radius = float(np.clip(setup.tool.radius + float(change[wider]), *TOOL_RADII))
     nu = float(np.clip(setup.material.poisson_ratio + float(change[softer]), *POISSON_BOUNDS))
     return replace(
         setup,

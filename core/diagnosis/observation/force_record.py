@@ -90,7 +90,10 @@ def _readings(
     run = np.cumsum(np.diff(untouched.astype(int), prepend=0) == 1)
     start = np.full(run.max() + 1, time[0])
     start[run[::-1]] = time[::-1]
-    cell = np.stack([run, (time - start[run]) // CRITERIA.force_error.bias_interval], axis=1)[
+    criteria = CRITERIA.force_error
+    # A slow stream needs longer for a reading of as many samples.
+    slow = 1.5 * criteria.least_samples * float(np.median(np.diff(time)))
+    cell = np.stack([run, (time - start[run]) // max(criteria.bias_interval, slow)], axis=1)[
         untouched
     ]
     _, index, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)

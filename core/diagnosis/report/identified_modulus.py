@@ -39,6 +39,10 @@ def modulus_entries(
     if not kinds or any(kind.name in named for kind in kinds):
         return [], []
     name = kinds[0].name
+    if findings.contradicted:
+        why = "the measured forces contradict the pushes, so that they fix no modulus"
+        again = "the force on the tool again, after palpate check is clear"
+        return [], [_unknown(name, why, again)]
     model = findings.best.model if findings.best else findings.baseline
     interval = modulus_interval(evaluator, model)
     height = ""

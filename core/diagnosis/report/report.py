@@ -33,7 +33,8 @@ _NO_CHECKS = AllClearChecks()
 def verdict_of(findings: Findings, checks: AllClearChecks = _NO_CHECKS) -> str:
     """Return the verdict: found, none, ambiguous or unexplained."""
     if findings.best is None:
-        return "unexplained" if findings.structured or checks.failed or findings.poor else "none"
+        unclear = findings.structured or findings.poor or findings.contradicted
+        return "unexplained" if unclear or checks.failed else "none"
     if findings.rivals():
         return "ambiguous"
     return "found"

@@ -71,6 +71,7 @@ class Findings:
         identifiability: of each effect by this experiment, whatever the data are.
         ripple: of the camera's depth in the rest cloud, which no effect expresses.
         withdrawn: reason why the causes found are not named; empty for no reason.
+        contradicted: whether the measured forces contradict the model that is left.
         known: effects without which nothing can be replayed: touches of other landmarks.
         hints: reason why an effect with enough gain is not named, by name.
         tolerance: size below which structured error does not matter.
@@ -94,6 +95,7 @@ class Findings:
     identifiability: tuple[Identifiability, ...] = ()
     ripple: Ripple = CALM
     withdrawn: str = ""
+    contradicted: bool = False
     known: tuple[Effect, ...] = ()
     hints: dict[str, str] = field(default_factory=dict)
     tolerance: Tolerance = field(default_factory=Tolerance)
@@ -114,6 +116,11 @@ class Findings:
         ]
         self.hints |= dict.fromkeys(sorted(names), why)
         self.best, self.remaining, self.withdrawn = None, self.structure, why
+
+    def contradict(self, why: str) -> None:
+        """Name nothing, for this reason: the forces contradict every model."""
+        self.withdraw(why)
+        self.contradicted = True
 
     @property
     def faint(self) -> bool:

@@ -19,11 +19,17 @@ from palpate.registration.pose import motion_jacobian, small_motion
 from palpate.registration.robust_weights import centred_weights, depth_noise, robust_weights
 from palpate.registration.uncertainty import PRIOR, estimate, make_patches
 
-__all__ = ["fit_camera", "refine_camera"]
+__all__ = ["fit_camera", "nearest_pose", "refine_camera"]
 
 _HALF_TURN = (
     "A plain block looks the same after half a turn: its heading cannot be told from the rest "
     "cloud; give [camera] to_phantom to settle it."
+)
+
+_LOST = (
+    "[camera] to_phantom puts none of the rest cloud on the phantom, so that the pose was searched "
+    "without it: is it the inverse, or of another convention of axes (x right, y down, z forward "
+    "is expected)? Correct or remove it."
 )
 
 
@@ -56,8 +62,12 @@ def fit_camera(
     gate = max(2.0 * depth_sigma, 3.0e-3)
     poses = []
     failure = None
+    lost = ""
     if guess is not None:
-        poses.append(_refine(cloud, size, align_by_icp(cloud, size, guess), guess, gate))
+        try:
+            poses.append(_refine(cloud, size, align_by_icp(cloud, size, guess), guess, gate))
+        except RegistrationError as error:
+            failure, guess, lost = error, None, _LOST
     try:
         start = automatic_guess(cloud, size, depth_sigma)
         starts = sorted((start, half_turn() @ start), key=lambda pose: _preference(pose, guess))
@@ -71,9 +81,9 @@ def fit_camera(
     shares = [_explained(cloud, size, pose, depth_sigma) for pose in poses]
     # The given guess wins ties: it holds the heading and the undetermined directions.
     best = 1 if len(poses) == 2 and shares[1] > shares[0] + 0.05 else 0
-    return _conclude(
-        cloud, size, poses[best], shares[best], gate, guess, automatic=guess is None or best == 1
-    )
+    automatic = guess is None or best == 1
+    fit = _conclude(cloud, size, poses[best], shares[best], gate, guess, automatic=automatic)
+    return replace(fit, warnings=(lost, *fit.warnings)) if lost else fit
 
 
 def refine_camera(
@@ -96,6 +106,20 @@ def refine_camera(
     return _conclude(
         cloud, size, pose, _explained(cloud, size, pose, depth_sigma), gate, pose, automatic=False
     )
+
+
+def nearest_pose(
+    cloud: FloatArray,
+    size: tuple[float, float, float],
+    start: Transform,
+    depth_sigma: float = 0.002,
+) -> Transform:
+    """Find the pose next to `start` in which a raw cloud shows a block, without its uncertainty.
+
+    Args and errors are those of `fit_camera`.
+    """
+    gate = max(2.0 * depth_sigma, 3.0e-3)
+    return _refine(cloud, size, align_by_icp(cloud, size, start), start, gate)
 
 
 def _preference(pose: Transform, guess: Transform | None) -> float:

@@ -20,7 +20,7 @@ from palpate.registration.shape.seen_rays import SeenRays
 from palpate.registration.uncertainty import Patches, PoseEstimate, estimate, make_patches
 from palpate.setup.phantom_geometry import Geometry
 
-__all__ = ["fit_shape_camera", "refine_shape_camera", "settled_pose"]
+__all__ = ["fit_shape_camera", "nearest_shape_pose", "refine_shape_camera", "settled_pose"]
 
 _POOR = 1.3
 """Misfit of depth from which on the plane that was found may be no table [variances]."""
@@ -77,6 +77,18 @@ def refine_shape_camera(
     view = SeenRays.of(cloud, body, depth_sigma, table)
     pose = improved(view, body, start @ view.to_camera) @ view.from_camera
     return _fitted(cloud, body, pose, depth_sigma, view)
+
+
+def nearest_shape_pose(
+    cloud: FloatArray, geometry: Geometry, start: Transform, depth_sigma: float = 0.002
+) -> Transform:
+    """Find the pose next to `start` in which a raw cloud shows a body, without its uncertainty.
+
+    Args and errors are those of `fit_shape_camera`.
+    """
+    body = SeenBody(geometry)
+    view = SeenRays.of(cloud, body, depth_sigma, _table(cloud, body, depth_sigma))
+    return improved(view, body, start @ view.to_camera) @ view.from_camera
 
 
 def _table(cloud: FloatArray, body: SeenBody, depth_sigma: float) -> TablePlane | None:
