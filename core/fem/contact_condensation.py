@@ -1,14 +1,14 @@
 """Static condensation of a linearised body on the nodes near the tool, with exact contact.
 
 Pushing a ball into a soft block changes the elastic tangent slowly, but the set of touching points
-changes with every step. So the body's response M^-1 to forces on the surface near the tool is
+changes with every step. So the body's stiffness K against forces on the surface near the tool is
 computed once (static condensation on those nodes), and each step solves
 
-    r(u) + M e - K e + f(u + e) - f(u) = 0
+    r(u) + M e - C e + f(u + e) - f(u) = 0
 
-for the change e, with r the residual, f the true contact force and K the contact's share of M: a
-small dense system, solved by Newton's method. The error left is the change of the elastic tangent;
-the residual shrinks from step to step.
+for the change e, with r the residual, M the tangent, f the true contact force and C the contact's
+share of M, K being the Schur complement of M - C: a small dense system, solved by Newton's method.
+The error left is the change of the elastic tangent; the residual shrinks from step to step.
 """
 
 from __future__ import annotations
@@ -17,19 +17,25 @@ from typing import Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 
-from palpate.fem.contact import assemble_contact, contact_energy
+from palpate.fem.contact_patch import ContactPatch
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
-from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray, IntArray
 
 __all__ = ["CondensedContact"]
 
 _MARGIN, _EDGES = 5e-4, 0.3
-"""Surface nodes within this distance of the ball [m], or this share of their side's length, are
-condensed: they may come into contact in the next steps. A node further off that does so shows in
-the residual, and is included by the next linearisation."""
+"""Surface nodes within this distance of the ball [m], or this share of their side's length, may
+come into contact in the next steps. A node further off that does so shows in the residual, and is
+included by the next linearisation."""
+_CELL = 4e-3
+"""Away from a mesh's focus, the kept nodes are those in a box whose bounds are multiples of this
+[m]: while the tool moves, they remain the same for a while, and so does the elimination order."""
+_SOON = 1e-4
+"""Points within this distance of the ball [m] are expected to touch in a step; if others do, the
+step is balanced again with all nodes near the ball."""
 _INNER_STEPS = 25
 _INNER_TOLERANCE = 1e-8
 
@@ -41,27 +47,32 @@ class CondensedContact:
         self,
         model: BlockModel,
         faces: IntArray,
-        nodes: IntArray,
+        kept: IntArray,
         positions: FloatArray,
         tool: ToolSphere,
     ) -> None:
-        self._faces, self._nodes = faces, nodes
-        self._unknown = model.topology.unknown[nodes].ravel()
-        where = np.full(len(model.mesh.nodes), -1)
-        where[nodes] = np.arange(len(nodes))
-        self._local = np.ascontiguousarray(where[model.topology.surface[faces]])
-        self._slots = _dense_slots(self._local, len(nodes))
-        self._share = self._contact(model, positions[nodes], tool, bending=False)[1]
-        self._condensed = np.linalg.inv(model.topology.factor.inverse_entries(self._unknown))
-        self._stiffness = self._condensed - self._share
-        self._topology, self._generation = model.topology, model.topology.factor.generation
+        state = model.assemble(positions, tool, bending=False)
+        self._condensation = model.condense(state.data, model.topology.unknown[kept].ravel())
+        self._topology = model.topology
+        # The nearest nodes come last: in a Cholesky factor each trailing block is the stiffness
+        # condensed on the last nodes.
+        distance = np.linalg.norm(positions[kept] - tool.centre, axis=1)
+        self._order = np.argsort(-distance, kind="stable")
+        self._nodes = kept[self._order]
+        self._rows = (3 * self._order[:, None] + np.arange(3)).ravel()
+        self._faces = ContactPatch(model, faces, self._nodes)
+        self._share = self._faces.contact(model, positions[self._nodes], tool, bending=False)[1]
+        self._loaded = self._faces.count_within(model, positions[self._nodes], tool, 0.0)
+        self._matrix = self._condensation.matrix[np.ix_(self._rows, self._rows)]
+        try:
+            self._factor: FloatArray | None = cholesky(self._matrix, check_finite=False)
+        except LinAlgError:
+            self._factor = None
+        self._parts: dict[int, tuple[ContactPatch, FloatArray]] = {}
 
     def fits(self, model: BlockModel) -> bool:
         """Whether the factor is still stored, and belongs to a grid with the same elements."""
-        return (
-            model.topology is self._topology
-            and model.topology.factor.generation == self._generation
-        )
+        return model.topology is self._topology and self._condensation.stored
 
     @classmethod
     def at(cls, model: BlockModel, positions: FloatArray, tool: ToolSphere) -> Self | None:
@@ -82,145 +93,154 @@ class CondensedContact:
         near = near[np.isin(top.surface[near], nodes).all(axis=1)]
         if not len(near):
             return None
-        state = model.assemble(positions, tool, bending=False)
         try:
-            model.factorise(state.data)
+            return cls(model, near, _kept_nodes(model, nodes), positions, tool)
         except NotPositiveDefinite:
             return None
-        return cls(model, near, nodes, positions, tool)
-
-    def _contact(
-        self, model: BlockModel, positions: FloatArray, tool: ToolSphere, *, bending: bool = True
-    ) -> tuple[FloatArray, FloatArray]:
-        """Contact force (m,) and its tangent (m, m) on the nodes near the tool, at these
-        positions.
-        """
-        force, data = np.zeros_like(positions), np.zeros(positions.size**2)
-        assemble_contact(
-            self._local,
-            model.areas[self._faces],
-            model.face.shapes,
-            model.face.gradients,
-            positions,
-            tool.centre,
-            tool.radius,
-            False,
-            not model.dense,
-            CONTACT_STIFFNESS,
-            bending,
-            self._slots,
-            force,
-            data,
-            np.zeros(3),
-        )
-        if model.friction_potential is not None:
-            friction = model.friction_potential.of(self._faces)
-            friction.assemble(
-                self._local,
-                model.face,
-                positions,
-                tool.centre,
-                self._slots,
-                force,
-                data,
-                np.zeros(3),
-            )
-        return force.ravel(), data.reshape(positions.size, positions.size)
 
     def step(
         self, model: BlockModel, positions: FloatArray, residual: FloatArray, tool: ToolSphere
     ) -> FloatArray | None:
         """Positions after one step; None if the contact finds no balance."""
-        free = model.topology.factor.approximate(residual)
+        reduced, partial = self._condensation.eliminate(-residual)
         here = positions[self._nodes]
-        contact, _ = self._contact(model, here, tool)
-        change = self._balance(model, here, tool, self._condensed @ free[self._unknown] - contact)
+        contact = self._faces.contact(model, here, tool, tangent=False)[0]
+        load = -reduced[self._rows] - contact
+        change = self._change(model, here, tool, load)
         if change is None:
             return None
-        force, _ = self._contact(model, here + change.reshape(-1, 3), tool)
+        kept = np.empty_like(change)
+        kept[self._rows] = change
         moved = positions.copy()
-        further = np.zeros_like(residual)
-        further[self._unknown] = force - contact - self._share @ change
-        moved[model.topology.free] -= free + model.topology.factor.approximate(further)
+        moved[model.topology.free] += self._condensation.substitute(partial, kept)
         return moved
 
-    def _balance(
+    def _change(
         self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
     ) -> FloatArray | None:
-        """The change (m,) that minimises the energy of condensed body and contact.
-
-        Newton's method with a line search; None if it does not converge.
+        """The change (m,) of the kept unknowns that minimises the energy of condensed body and
+        contact; None if none is found.
         """
-        change = np.zeros(len(load))
-        energy = self._energy(model, here, tool, load, change)
-        for _ in range(_INNER_STEPS):
-            slope, move = self._move(model, here, tool, load, change)
-            length = 1.0
-            while length > 1e-3:
-                value = self._energy(model, here, tool, load, change + length * move)
-                if value <= energy + 1e-4 * length * float(slope @ move) + model.rounding:
-                    break
-                length /= 2
-            change, energy = change + length * move, value
-            if float(np.abs(move).max()) < _INNER_TOLERANCE:
-                return change
-        return None
-
-    def _move(
-        self,
-        model: BlockModel,
-        here: FloatArray,
-        tool: ToolSphere,
-        load: FloatArray,
-        change: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Gradient of the condensed energy (m,) and Newton's step (m,).
-
-        The contact's curvature is left out if the tangent with it is not positive.
-        """
-        force, tangent = self._contact(model, here + change.reshape(-1, 3), tool)
-        slope = self._stiffness @ change + load + force
-        try:
-            factor = cho_factor(self._stiffness + tangent, check_finite=False)
-            return slope, np.asarray(-cho_solve(factor, slope, check_finite=False))
-        except LinAlgError:
-            _, tangent = self._contact(model, here + change.reshape(-1, 3), tool, bending=False)
-            return slope, np.asarray(-np.linalg.solve(self._stiffness + tangent, slope))
-
-    def _energy(
-        self,
-        model: BlockModel,
-        here: FloatArray,
-        tool: ToolSphere,
-        load: FloatArray,
-        change: FloatArray,
-    ) -> float:
-        """Energy over E [m^3] of the condensed body and the contact."""
-        contact = contact_energy(
-            self._local,
-            model.areas[self._faces],
-            model.face.shapes,
-            model.face.gradients,
-            here + change.reshape(-1, 3),
-            tool.centre,
-            tool.radius,
-            False,
-            not model.dense,
-            CONTACT_STIFFNESS,
-        )
-        if model.friction_potential is not None:
-            contact += model.friction_potential.of(self._faces).energy(
-                self._local, model.face, here + change.reshape(-1, 3), tool.centre
+        if self._factor is None:
+            return _balance(model, self._faces, self._matrix - self._share, here, tool, load)
+        factor, every = self._factor, self._faces.count
+        count = max(self._loaded, self._faces.count_within(model, here, tool, _SOON))
+        response = solve_triangular(factor, load, trans="T", check_finite=False)
+        for active in dict.fromkeys((count, every)):
+            first = 3 * (len(self._nodes) - active)
+            patch, stiffness = self._part(factor, active)
+            near = _balance(
+                model,
+                patch,
+                stiffness,
+                here[-active:],
+                tool,
+                factor[first:, first:].T @ response[first:],
             )
-        return float(0.5 * change @ self._stiffness @ change + load @ change + contact)
+            if near is None:
+                return None
+            far = solve_triangular(
+                factor[:first, :first],
+                -response[:first] - factor[:first, first:] @ near,
+                check_finite=False,
+            )
+            change = np.concatenate([far, near])
+            moved = here + change.reshape(-1, 3)
+            if active >= self._faces.count_within(model, moved, tool, 0.0):
+                break
+        return change
+
+    def _part(self, factor: FloatArray, active: int) -> tuple[ContactPatch, FloatArray]:
+        """The sides between the last nodes, so many of them, and the body's stiffness condensed on
+        these nodes (3 k, 3 k).
+
+        The contact's share belongs to these nodes alone, so that the others may be eliminated with
+        it.
+        """
+        if active not in self._parts:
+            first = 3 * (len(self._nodes) - active)
+            last = factor[first:, first:]
+            stiffness = last.T @ last - self._share[first:, first:]
+            self._parts[active] = self._faces.between_last(active), stiffness
+        return self._parts[active]
 
 
-def _dense_slots(local: IntArray, count: int) -> IntArray:
-    """Positions of the entries of each face's matrix in a dense matrix of all nodes (f, 3 b, 3 b).
-
-    They are -1 for nodes outside.
+def _kept_nodes(model: BlockModel, near: IntArray) -> IntArray:
+    """Nodes on which the body is condensed: those near the tool (k,) and more, so that the set
+    seldom changes.
     """
-    numbers = (3 * local[:, :, None] + np.arange(3)).reshape(len(local), -1)
-    return np.ascontiguousarray(numbers[:, :, None] * 3 * count + numbers[:, None, :]).astype(
-        np.int32
-    )
+    top, mesh = model.topology, model.mesh
+    focus = mesh.near_focus[top.free[mesh.near_focus].all(axis=1)]
+    if np.isin(near, focus).all():
+        return focus
+    rest = mesh.nodes[near]
+    low = np.floor(rest.min(axis=0) / _CELL) * _CELL
+    high = np.ceil(rest.max(axis=0) / _CELL) * _CELL
+    surface = np.unique(top.surface)
+    surface = surface[top.free[surface].all(axis=1)]
+    inside = ((mesh.nodes[surface] >= low) & (mesh.nodes[surface] <= high)).all(axis=1)
+    return np.union1d(near, surface[inside])
+
+
+def _balance(
+    model: BlockModel,
+    patch: ContactPatch,
+    stiffness: FloatArray,
+    here: FloatArray,
+    tool: ToolSphere,
+    load: FloatArray,
+) -> FloatArray | None:
+    """The change (m,) that minimises the energy of condensed body and contact.
+
+    Newton's method with a line search; None if it does not converge.
+
+    Args:
+        model: the body.
+        patch: sides that may touch.
+        stiffness: (m, m) condensed on their nodes [m].
+        here: (k, 3) of the nodes [m].
+        tool: the tool.
+        load: (m,) over E [m^2].
+    """
+    change, pulled = np.zeros(len(load)), np.zeros(len(load))
+    energy = patch.energy(model, here, tool)
+    for _ in range(_INNER_STEPS):
+        place = here + change.reshape(-1, 3)
+        slope, move = _move(model, patch, stiffness, place, tool, load + pulled)
+        stretched = stiffness @ move
+        length = 1.0
+        while length > 1e-3:
+            trial = change + length * move
+            value = patch.energy(model, here + trial.reshape(-1, 3), tool) + float(
+                (0.5 * (pulled + length * stretched) + load) @ trial
+            )
+            if value <= energy + 1e-4 * length * float(slope @ move) + model.rounding:
+                break
+            length /= 2
+        change, pulled, energy = trial, pulled + length * stretched, value
+        if float(np.abs(move).max()) < _INNER_TOLERANCE:
+            return change
+    return None
+
+
+def _move(
+    model: BlockModel,
+    patch: ContactPatch,
+    stiffness: FloatArray,
+    place: FloatArray,
+    tool: ToolSphere,
+    load: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Gradient of the condensed energy (m,) and Newton's step (m,).
+
+    The contact's curvature is left out if the tangent with it is not positive.
+    """
+    force, tangent = patch.contact(model, place, tool)
+    slope = load + force
+    tangent += stiffness
+    try:
+        factor = cho_factor(tangent, check_finite=False)
+        return slope, np.asarray(-cho_solve(factor, slope, check_finite=False))
+    except LinAlgError:
+        tangent = patch.contact(model, place, tool, bending=False)[1]
+        return slope, np.asarray(-np.linalg.solve(stiffness + tangent, slope))
