@@ -17,8 +17,9 @@ from typing import Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
+from palpate.fem.contact_balance import ContactBalance
 from palpate.fem.contact_patch import ContactPatch
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.fem.model import BlockModel, ToolSphere
@@ -36,8 +37,6 @@ _CELL = 4e-3
 _SOON = 1e-4
 """Points within this distance of the ball [m] are expected to touch in a step; if others do, the
 step is balanced again with all nodes near the ball."""
-_INNER_STEPS = 25
-_INNER_TOLERANCE = 1e-8
 
 
 class CondensedContact:
@@ -68,7 +67,7 @@ class CondensedContact:
             self._factor: FloatArray | None = cholesky(self._matrix, check_finite=False)
         except LinAlgError:
             self._factor = None
-        self._parts: dict[int, tuple[ContactPatch, FloatArray]] = {}
+        self._parts: dict[int, ContactBalance] = {}
 
     def fits(self, model: BlockModel) -> bool:
         """Whether the factor is still stored, and belongs to a grid with the same elements."""
@@ -122,20 +121,14 @@ class CondensedContact:
         contact; None if none is found.
         """
         if self._factor is None:
-            return _balance(model, self._faces, self._matrix - self._share, here, tool, load)
+            return self._part(None, len(self._nodes)).change(model, here, tool, load)
         factor, every = self._factor, self._faces.count
         count = max(self._loaded, self._faces.count_within(model, here, tool, _SOON))
         response = solve_triangular(factor, load, trans="T", check_finite=False)
         for active in dict.fromkeys((count, every)):
             first = 3 * (len(self._nodes) - active)
-            patch, stiffness = self._part(factor, active)
-            near = _balance(
-                model,
-                patch,
-                stiffness,
-                here[-active:],
-                tool,
-                factor[first:, first:].T @ response[first:],
+            near = self._part(factor, active).change(
+                model, here[-active:], tool, factor[first:, first:].T @ response[first:]
             )
             if near is None:
                 return None
@@ -150,18 +143,19 @@ class CondensedContact:
                 break
         return change
 
-    def _part(self, factor: FloatArray, active: int) -> tuple[ContactPatch, FloatArray]:
-        """The sides between the last nodes, so many of them, and the body's stiffness condensed on
-        these nodes (3 k, 3 k).
+    def _part(self, factor: FloatArray | None, active: int) -> ContactBalance:
+        """The contact between the last nodes, so many of them, and the body condensed on these.
 
         The contact's share belongs to these nodes alone, so that the others may be eliminated with
-        it.
+        it. Without a factor (of all nodes) none are.
         """
         if active not in self._parts:
             first = 3 * (len(self._nodes) - active)
-            last = factor[first:, first:]
-            stiffness = last.T @ last - self._share[first:, first:]
-            self._parts[active] = self._faces.between_last(active), stiffness
+            last = None if factor is None else factor[first:, first:]
+            stiffness = self._matrix if last is None else last.T @ last
+            self._parts[active] = ContactBalance(
+                self._faces.between_last(active), stiffness - self._share[first:, first:]
+            )
         return self._parts[active]
 
 
@@ -180,67 +174,3 @@ def _kept_nodes(model: BlockModel, near: IntArray) -> IntArray:
     surface = surface[top.free[surface].all(axis=1)]
     inside = ((mesh.nodes[surface] >= low) & (mesh.nodes[surface] <= high)).all(axis=1)
     return np.union1d(near, surface[inside])
-
-
-def _balance(
-    model: BlockModel,
-    patch: ContactPatch,
-    stiffness: FloatArray,
-    here: FloatArray,
-    tool: ToolSphere,
-    load: FloatArray,
-) -> FloatArray | None:
-    """The change (m,) that minimises the energy of condensed body and contact.
-
-    Newton's method with a line search; None if it does not converge.
-
-    Args:
-        model: the body.
-        patch: sides that may touch.
-        stiffness: (m, m) condensed on their nodes [m].
-        here: (k, 3) of the nodes [m].
-        tool: the tool.
-        load: (m,) over E [m^2].
-    """
-    change, pulled = np.zeros(len(load)), np.zeros(len(load))
-    energy = patch.energy(model, here, tool)
-    for _ in range(_INNER_STEPS):
-        place = here + change.reshape(-1, 3)
-        slope, move = _move(model, patch, stiffness, place, tool, load + pulled)
-        stretched = stiffness @ move
-        length = 1.0
-        while length > 1e-3:
-            trial = change + length * move
-            value = patch.energy(model, here + trial.reshape(-1, 3), tool) + float(
-                (0.5 * (pulled + length * stretched) + load) @ trial
-            )
-            if value <= energy + 1e-4 * length * float(slope @ move) + model.rounding:
-                break
-            length /= 2
-        change, pulled, energy = trial, pulled + length * stretched, value
-        if float(np.abs(move).max()) < _INNER_TOLERANCE:
-            return change
-    return None
-
-
-def _move(
-    model: BlockModel,
-    patch: ContactPatch,
-    stiffness: FloatArray,
-    place: FloatArray,
-    tool: ToolSphere,
-    load: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Gradient of the condensed energy (m,) and Newton's step (m,).
-
-    The contact's curvature is left out if the tangent with it is not positive.
-    """
-    force, tangent = patch.contact(model, place, tool)
-    slope = load + force
-    tangent += stiffness
-    try:
-        factor = cho_factor(tangent, check_finite=False)
-        return slope, np.asarray(-cho_solve(factor, slope, check_finite=False))
-    except LinAlgError:
-        tangent = patch.contact(model, place, tool, bending=False)[1]
-        return slope, np.asarray(-np.linalg.solve(stiffness + tangent, slope))
