@@ -17,7 +17,7 @@ from typing import Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from palpate.fem.contact_balance import ContactBalance
 from palpate.fem.contact_patch import ContactPatch
@@ -62,12 +62,12 @@ class CondensedContact:
         self._faces = ContactPatch(model, faces, self._nodes)
         self._share = self._faces.contact(model, positions[self._nodes], tool, bending=False)[1]
         self._loaded = self._faces.count_within(model, positions[self._nodes], tool, 0.0)
-        self._matrix = self._condensation.matrix[np.ix_(self._rows, self._rows)]
+        matrix = self._condensation.matrix[np.ix_(self._rows, self._rows)]
         try:
-            self._factor: FloatArray | None = cholesky(self._matrix, check_finite=False)
-        except LinAlgError:
-            self._factor = None
-        self._parts: dict[int, ContactBalance] = {}
+            self._factor: FloatArray = cholesky(matrix, overwrite_a=True, check_finite=False)
+        except LinAlgError as error:
+            raise NotPositiveDefinite("the condensed tangent has no Cholesky factor") from error
+        self._parts: dict[int, _ActiveNodes] = {}
 
     def fits(self, model: BlockModel) -> bool:
         """Whether the factor is still stored, and belongs to a grid with the same elements."""
@@ -120,43 +120,57 @@ class CondensedContact:
         """The change (m,) of the kept unknowns that minimises the energy of condensed body and
         contact; None if none is found.
         """
-        if self._factor is None:
-            return self._part(None, len(self._nodes)).change(model, here, tool, load)
-        factor, every = self._factor, self._faces.count
         count = max(self._loaded, self._faces.count_within(model, here, tool, _SOON))
-        response = solve_triangular(factor, load, trans="T", check_finite=False)
-        for active in dict.fromkeys((count, every)):
-            first = 3 * (len(self._nodes) - active)
-            near = self._part(factor, active).change(
-                model, here[-active:], tool, factor[first:, first:].T @ response[first:]
-            )
-            if near is None:
+        for active in dict.fromkeys((count, self._faces.count)):
+            change = self._part(active).change(model, here, tool, load)
+            if change is None:
                 return None
-            far = solve_triangular(
-                factor[:first, :first],
-                -response[:first] - factor[:first, first:] @ near,
-                check_finite=False,
-            )
-            change = np.concatenate([far, near])
             moved = here + change.reshape(-1, 3)
             if active >= self._faces.count_within(model, moved, tool, 0.0):
                 break
         return change
 
-    def _part(self, factor: FloatArray | None, active: int) -> ContactBalance:
-        """The contact between the last nodes, so many of them, and the body condensed on these.
-
-        The contact's share belongs to these nodes alone, so that the others may be eliminated with
-        it. Without a factor (of all nodes) none are.
-        """
+    def _part(self, active: int) -> _ActiveNodes:
+        """The contact on the last nodes, so many of them."""
         if active not in self._parts:
-            first = 3 * (len(self._nodes) - active)
-            last = None if factor is None else factor[first:, first:]
-            stiffness = self._matrix if last is None else last.T @ last
-            self._parts[active] = ContactBalance(
-                self._faces.between_last(active), stiffness - self._share[first:, first:]
+            share = self._share[-3 * active :, -3 * active :]
+            self._parts[active] = _ActiveNodes(
+                self._faces.between_last(active), self._factor, share
             )
         return self._parts[active]
+
+
+class _ActiveNodes:
+    """Contact on the last of the kept nodes; the others follow them.
+
+    Args:
+        patch: sides between the last nodes.
+        factor: (m, m) upper Cholesky factor of the body's stiffness over E with the contact's share.
+        share: (k, k) of the contact in it [m], which belongs to the last nodes alone.
+    """
+
+    def __init__(self, patch: ContactPatch, factor: FloatArray, share: FloatArray) -> None:
+        self._first = first = len(factor) - len(share)
+        self._factor, last = np.asfortranarray(factor[:first, :first]), factor[first:, first:]
+        self._balance = ContactBalance(patch, last.T @ last - share)
+        self._response = factor[:first, first:]
+        if first:
+            self._response = solve_triangular(self._factor, self._response, check_finite=False)
+
+    def change(
+        self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
+    ) -> FloatArray | None:
+        """The change of all kept unknowns (m,), as of `ContactBalance.change`."""
+        first, response = self._first, self._response
+        if not first:
+            return self._balance.change(model, here, tool, load)
+        near = self._balance.change(
+            model, here[first // 3 :], tool, load[first:] - response.T @ load[:first]
+        )
+        if near is None:
+            return None
+        far = cho_solve((self._factor, False), load[:first], check_finite=False)
+        return np.concatenate([-far - response @ near, near])
 
 
 def _kept_nodes(model: BlockModel, near: IntArray) -> IntArray:
