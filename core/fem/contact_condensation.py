@@ -100,7 +100,7 @@ class CondensedContact:
     def step(
         self, model: BlockModel, positions: FloatArray, residual: FloatArray, tool: ToolSphere
     ) -> FloatArray | None:
-        """Positions after one step; None if the contact finds no balance."""
+        """One step of the unknowns (u,) [m]; None if the contact finds no balance."""
         reduced, partial = self._condensation.eliminate(-residual)
         here = positions[self._nodes]
         contact = self._faces.contact(model, here, tool, tangent=False)[0]
@@ -110,9 +110,7 @@ class CondensedContact:
             return None
         kept = np.empty_like(change)
         kept[self._rows] = change
-        moved = positions.copy()
-        moved[model.topology.free] += self._condensation.substitute(partial, kept)
-        return moved
+        return self._condensation.substitute(partial, kept)
 
     def _change(
         self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
