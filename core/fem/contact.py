@@ -54,9 +54,7 @@ def _gap(
 
 
 @njit(cache=True)
-def _outward_part(
-    positions: Any, face: Any, gradients: Any, x: float, y: float, z: float
-) -> float:
+def _outward_part(positions: Any, face: Any, gradients: Any, x: float, y: float, z: float) -> float:
     """Product of a side's outward normal, not of unit length, at a point and a vector."""
     s_x = s_y = s_z = t_x = t_y = t_z = 0.0
     for a in range(face.shape[0]):
@@ -67,9 +65,7 @@ def _outward_part(
         t_x += across * positions[node, 0]
         t_y += across * positions[node, 1]
         t_z += across * positions[node, 2]
-    return (
-        (s_y * t_z - s_z * t_y) * x + (s_z * t_x - s_x * t_z) * y + (s_x * t_y - s_y * t_x) * z
-    )
+    return (s_y * t_z - s_z * t_y) * x + (s_z * t_x - s_x * t_z) * y + (s_x * t_y - s_y * t_x) * z
 
 
 @njit(cache=True)
@@ -170,8 +166,6 @@ def assemble_contact(
         if not _in_reach(positions, faces[f], centre, radius, flat):
             continue
         for q in range(shapes.shape[0]):
-            if areas[f, q] == 0.0:
-                continue
             gap = _gap(
                 positions,
                 faces[f],
@@ -183,7 +177,7 @@ def assemble_contact(
                 facing,
                 direction,
             )
-            if gap >= 0:
+            if gap >= 0 or areas[f, q] == 0.0:
                 continue
             deepest = max(deepest, -gap)
             weight = stiffness * areas[f, q]

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 
-from palpate.fem.contact_balance import ContactBalance
-from palpate.fem.contact_patch import ContactPatch
+from palpate.fem.contact_patch import ContactBalance, ContactPatch
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
 from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray, IntArray
@@ -51,8 +50,9 @@ class CondensedContact:
         tool: ToolSphere,
     ) -> None:
         state = model.assemble(positions, tool, bending=False)
-        self._condensation = model.condense(state.data, model.topology.unknown[kept].ravel())
-        self._topology = model.topology
+        model.spend(1.0)
+        self._topology = top = model.topology
+        self._condensation = top.factor.condense(state.data, top.unknown[kept].ravel())
         # The nearest nodes come last: in a Cholesky factor each trailing block is the stiffness
         # condensed on the last nodes.
         distance = np.linalg.norm(positions[kept] - tool.centre, axis=1)
@@ -143,7 +143,8 @@ class _ActiveNodes:
 
     Args:
         patch: sides between the last nodes.
-        factor: (m, m) upper Cholesky factor of the body's stiffness over E with the contact's share.
+        factor: (m, m) upper Cholesky factor of the body's stiffness over E with the contact's
+            share.
         share: (k, k) of the contact in it [m], which belongs to the last nodes alone.
     """
 

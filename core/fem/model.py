@@ -17,10 +17,9 @@ from palpate.fem.constitutive.elastic import Law, assemble_elastic, elastic_ener
 from palpate.fem.constitutive.stiffness_field import log_stiffness, surface_stiffness
 from palpate.fem.contact import assemble_contact, contact_energy
 from palpate.fem.friction import FrictionPotential
-from palpate.fem.linalg.direct_solver import Condensation
 from palpate.fem.mesh_quadrature import element_quadrature, surface_quadrature
 from palpate.fem.topology import topology
-from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
+from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.mesh.elements import face_weights
 from palpate.mesh.protocol import Mesh
 from palpate.setup.free_form.closest_point import winding_number
@@ -133,13 +132,6 @@ class BlockModel:
         """Factorise a tangent with these entries [m]; raises NotPositiveDefinite."""
         self.spend(1.0)
         self.topology.factor.factorise(data)
-
-    def condense(self, data: FloatArray, unknowns: IntArray) -> Condensation:
-        """Condense a tangent with these entries [m] on unknowns (m,); raises
-        NotPositiveDefinite.
-        """
-        self.spend(1.0)
-        return self.topology.factor.condense(data, unknowns)
 
     def harden(self, hardness: float) -> None:
         """Multiply the contact stiffness by this factor over its initial value [1]."""

@@ -94,15 +94,15 @@ class ModifiedNewton:
         does not reach the tolerance.
         """
         positions, best = start
-        residual = relative_residual(model, best)
+        residual, taken = relative_residual(model, best), 0
         self._pairs.begin()
-        for number in range(_MOST_STEPS):
+        while True:
             if residual <= tolerance:
                 finite = bool(np.isfinite(model.energy(positions, tool)))
                 outcome = contact_outcome(model, tool, positions) if finite else Outcome.INVERTED
                 break
-            plain = condensed.step(model, positions, best.residual, tool)
             outcome = Outcome.ITERATIONS
+            plain = condensed.step(model, positions, best.residual, tool)
             if plain is None:
                 break
             trial = positions.copy()
@@ -111,7 +111,7 @@ class ModifiedNewton:
             now = relative_residual(model, state)
             if not now < _SHRINKING * residual:
                 break
-            positions, best, residual = trial, state, now
-        return Solution(
-            positions, best.push, outcome, number, residual, best.penetration
-        ), best
+            positions, best, residual, taken = trial, state, now, taken + 1
+            if taken == _MOST_STEPS:
+                break
+        return Solution(positions, best.push, outcome, taken, residual, best.penetration), best
