@@ -102,6 +102,23 @@ def test_condensed_nodes_are_near_the_focus_of_the_graded_mesh(place):
     assert not len(GridSpec(nodes=(9, 9, 5), order=2).mesh(SETUP, place).near_focus)
 
 
+def test_kept_nodes_away_from_a_focus_hold_all_near_the_tool_and_seldom_change():
+    block = Replay(SETUP, GridSpec(nodes=(13, 9, 7), order=2), 1e-6)
+    frame = block.step(PLACE)
+    model, positions = block.model(frame.mesh), frame.mesh.nodes + frame.displacement
+    assert frame.in_contact and not len(frame.mesh.near_focus)
+    kept = []
+    for aside in (0.0, 1e-4, -1e-4):
+        tool = ToolSphere(frame.tool.centre + aside * np.array([1.0, 1.0, 0.0]), frame.tool.radius)
+        condensed = CondensedContact.at(model, positions, tool)
+        assert condensed is not None
+        kept.append(np.sort(condensed._nodes))
+        surface = np.unique(model.topology.surface)
+        close = np.linalg.norm(positions[surface] - tool.centre, axis=1) < tool.radius + 5e-4
+        assert np.isin(surface[close], kept[-1]).all() and len(kept[-1]) < len(surface) / 2
+    assert all(np.array_equal(one, kept[0]) for one in kept)
+
+
 def test_distant_tool_has_no_linearisation():
     model, positions, _ = _pressed(1)
     far = ToolSphere(np.array([0.0, 0.0, 0.2]), 5e-3)
