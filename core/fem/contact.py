@@ -34,28 +34,38 @@ def _gap(
 
     `direction` receives the unit vector that opens the gap.
     """
-    x, s, t = np.zeros(3), np.zeros(3), np.zeros(3)
+    x, y, z = 0.0, 0.0, 0.0
     for a in range(face.shape[0]):
-        for i in range(3):
-            x[i] += shapes[a] * positions[face[a], i]
-            s[i] += gradients[a, 0] * positions[face[a], i]
-            t[i] += gradients[a, 1] * positions[face[a], i]
+        share, node = shapes[a], face[a]
+        x += share * positions[node, 0]
+        y += share * positions[node, 1]
+        z += share * positions[node, 2]
     if flat:
         direction[0], direction[1], direction[2] = 0.0, 0.0, 1.0
-        return x[2]  # type: ignore[no-any-return]
-    distance = 0.0
-    for i in range(3):
-        direction[i] = x[i] - centre[i]
-        distance += direction[i] ** 2
-    distance = np.sqrt(distance)
-    if distance >= radius:
+        return z
+    x, y, z = x - centre[0], y - centre[1], z - centre[2]
+    distance = np.sqrt(x * x + y * y + z * z)
+    if distance >= radius or distance < 1e-9:
         return 1.0
-    normal = np.cross(s, t)
-    away = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]
-    if (facing and away >= 0) or distance < 1e-9:
+    if facing and _outward_part(positions, face, gradients, x, y, z) >= 0:
         return 1.0
-    direction /= distance
+    direction[0], direction[1], direction[2] = x / distance, y / distance, z / distance
     return distance - radius  # type: ignore[no-any-return]
+
+
+@njit(cache=True)
+def _outward_part(positions: Any, face: Any, gradients: Any, x: float, y: float, z: float) -> float:
+    """Product of a side's outward normal, not of unit length, at a point and a vector."""
+    s_x = s_y = s_z = t_x = t_y = t_z = 0.0
+    for a in range(face.shape[0]):
+        node, along, across = face[a], gradients[a, 0], gradients[a, 1]
+        s_x += along * positions[node, 0]
+        s_y += along * positions[node, 1]
+        s_z += along * positions[node, 2]
+        t_x += across * positions[node, 0]
+        t_y += across * positions[node, 1]
+        t_z += across * positions[node, 2]
+    return (s_y * t_z - s_z * t_y) * x + (s_z * t_x - s_x * t_z) * y + (s_x * t_y - s_y * t_x) * z
 
 
 @njit(cache=True)

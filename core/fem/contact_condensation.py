@@ -1,14 +1,14 @@
 """Static condensation of a linearised body on the nodes near the tool, with exact contact.
 
 Pushing a ball into a soft block changes the elastic tangent slowly, but the set of touching points
-changes with every step. So the body's response M^-1 to forces on the surface near the tool is
+changes with every step. So the body's stiffness K against forces on the surface near the tool is
 computed once (static condensation on those nodes), and each step solves
 
-    r(u) + M e - K e + f(u + e) - f(u) = 0
+    r(u) + M e - C e + f(u + e) - f(u) = 0
 
-for the change e, with r the residual, f the true contact force and K the contact's share of M: a
-small dense system, solved by Newton's method. The error left is the change of the elastic tangent;
-the residual shrinks from step to step.
+for the change e, with r the residual, M the tangent, f the true contact force and C the contact's
+share of M, K being the Schur complement of M - C: a small dense system, solved by Newton's method.
+The error left is the change of the elastic tangent; the residual shrinks from step to step.
 """
 
 from __future__ import annotations
@@ -17,21 +17,25 @@ from typing import Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 
-from palpate.fem.contact import assemble_contact, contact_energy
+from palpate.fem.contact_patch import ContactBalance, ContactPatch
 from palpate.fem.linalg.direct_solver import NotPositiveDefinite
-from palpate.fem.model import CONTACT_STIFFNESS, BlockModel, ToolSphere
+from palpate.fem.model import BlockModel, ToolSphere
 from palpate.foundation.arrays import FloatArray, IntArray
 
 __all__ = ["CondensedContact"]
 
 _MARGIN, _EDGES = 5e-4, 0.3
-"""Surface nodes within this distance of the ball [m], or this share of their side's length, are
-condensed: they may come into contact in the next steps. A node further off that does so shows in
-the residual, and is included by the next linearisation."""
-_INNER_STEPS = 25
-_INNER_TOLERANCE = 1e-8
+"""Surface nodes within this distance of the ball [m], or this share of their side's length, may
+come into contact in the next steps. A node further off that does so shows in the residual, and is
+included by the next linearisation."""
+_CELL = 4e-3
+"""Away from a mesh's focus, the kept nodes are those in a box whose bounds are multiples of this
+[m]: while the tool moves, they remain the same for a while, and so does the elimination order."""
+_SOON = 1e-4
+"""Points within this distance of the ball [m] are expected to touch in a step; if others do, the
+step is balanced again with all nodes near the ball."""
 
 
 class CondensedContact:
@@ -41,27 +45,33 @@ class CondensedContact:
         self,
         model: BlockModel,
         faces: IntArray,
-        nodes: IntArray,
+        kept: IntArray,
         positions: FloatArray,
         tool: ToolSphere,
     ) -> None:
-        self._faces, self._nodes = faces, nodes
-        self._unknown = model.topology.unknown[nodes].ravel()
-        where = np.full(len(model.mesh.nodes), -1)
-        where[nodes] = np.arange(len(nodes))
-        self._local = np.ascontiguousarray(where[model.topology.surface[faces]])
-        self._slots = _dense_slots(self._local, len(nodes))
-        self._share = self._contact(model, positions[nodes], tool, bending=False)[1]
-        self._condensed = np.linalg.inv(model.topology.factor.inverse_entries(self._unknown))
-        self._stiffness = self._condensed - self._share
-        self._topology, self._generation = model.topology, model.topology.factor.generation
+        state = model.assemble(positions, tool, bending=False)
+        model.spend(1.0)
+        self._topology = top = model.topology
+        self._condensation = top.factor.condense(state.data, top.unknown[kept].ravel())
+        # The nearest nodes come last: in a Cholesky factor each trailing block is the stiffness
+        # condensed on the last nodes.
+        distance = np.linalg.norm(positions[kept] - tool.centre, axis=1)
+        self._order = np.argsort(-distance, kind="stable")
+        self._nodes = kept[self._order]
+        self._rows = (3 * self._order[:, None] + np.arange(3)).ravel()
+        self._faces = ContactPatch(model, faces, self._nodes)
+        self._share = self._faces.contact(model, positions[self._nodes], tool, bending=False)[1]
+        self._loaded = self._faces.count_within(model, positions[self._nodes], tool, 0.0)
+        matrix = self._condensation.matrix[np.ix_(self._rows, self._rows)]
+        try:
+            self._factor: FloatArray = cholesky(matrix, overwrite_a=True, check_finite=False)
+        except LinAlgError as error:
+            raise NotPositiveDefinite("the condensed tangent has no Cholesky factor") from error
+        self._parts: dict[int, _ActiveNodes] = {}
 
     def fits(self, model: BlockModel) -> bool:
         """Whether the factor is still stored, and belongs to a grid with the same elements."""
-        return (
-            model.topology is self._topology
-            and model.topology.factor.generation == self._generation
-        )
+        return model.topology is self._topology and self._condensation.stored
 
     @classmethod
     def at(cls, model: BlockModel, positions: FloatArray, tool: ToolSphere) -> Self | None:
@@ -82,145 +92,98 @@ class CondensedContact:
         near = near[np.isin(top.surface[near], nodes).all(axis=1)]
         if not len(near):
             return None
-        state = model.assemble(positions, tool, bending=False)
         try:
-            model.factorise(state.data)
+            return cls(model, near, _kept_nodes(model, nodes), positions, tool)
         except NotPositiveDefinite:
             return None
-        return cls(model, near, nodes, positions, tool)
-
-    def _contact(
-        self, model: BlockModel, positions: FloatArray, tool: ToolSphere, *, bending: bool = True
-    ) -> tuple[FloatArray, FloatArray]:
-        """Contact force (m,) and its tangent (m, m) on the nodes near the tool, at these
-        positions.
-        """
-        force, data = np.zeros_like(positions), np.zeros(positions.size**2)
-        assemble_contact(
-            self._local,
-            model.areas[self._faces],
-            model.face.shapes,
-            model.face.gradients,
-            positions,
-            tool.centre,
-            tool.radius,
-            False,
-            not model.dense,
-            CONTACT_STIFFNESS,
-            bending,
-            self._slots,
-            force,
-            data,
-            np.zeros(3),
-        )
-        if model.friction_potential is not None:
-            friction = model.friction_potential.of(self._faces)
-            friction.assemble(
-                self._local,
-                model.face,
-                positions,
-                tool.centre,
-                self._slots,
-                force,
-                data,
-                np.zeros(3),
-            )
-        return force.ravel(), data.reshape(positions.size, positions.size)
 
     def step(
         self, model: BlockModel, positions: FloatArray, residual: FloatArray, tool: ToolSphere
     ) -> FloatArray | None:
-        """Positions after one step; None if the contact finds no balance."""
-        free = model.topology.factor.approximate(residual)
+        """One step of the unknowns (u,) [m]; None if the contact finds no balance."""
+        reduced, partial = self._condensation.eliminate(-residual)
         here = positions[self._nodes]
-        contact, _ = self._contact(model, here, tool)
-        change = self._balance(model, here, tool, self._condensed @ free[self._unknown] - contact)
+        contact = self._faces.contact(model, here, tool, tangent=False)[0]
+        load = -reduced[self._rows] - contact
+        change = self._change(model, here, tool, load)
         if change is None:
             return None
-        force, _ = self._contact(model, here + change.reshape(-1, 3), tool)
-        moved = positions.copy()
-        further = np.zeros_like(residual)
-        further[self._unknown] = force - contact - self._share @ change
-        moved[model.topology.free] -= free + model.topology.factor.approximate(further)
-        return moved
+        kept = np.empty_like(change)
+        kept[self._rows] = change
+        return self._condensation.substitute(partial, kept)
 
-    def _balance(
+    def _change(
         self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
     ) -> FloatArray | None:
-        """The change (m,) that minimises the energy of condensed body and contact.
-
-        Newton's method with a line search; None if it does not converge.
+        """The change (m,) of the kept unknowns that minimises the energy of condensed body and
+        contact; None if none is found.
         """
-        change = np.zeros(len(load))
-        energy = self._energy(model, here, tool, load, change)
-        for _ in range(_INNER_STEPS):
-            slope, move = self._move(model, here, tool, load, change)
-            length = 1.0
-            while length > 1e-3:
-                value = self._energy(model, here, tool, load, change + length * move)
-                if value <= energy + 1e-4 * length * float(slope @ move) + model.rounding:
-                    break
-                length /= 2
-            change, energy = change + length * move, value
-            if float(np.abs(move).max()) < _INNER_TOLERANCE:
-                return change
-        return None
+        count = max(self._loaded, self._faces.count_within(model, here, tool, _SOON))
+        for active in dict.fromkeys((count, self._faces.count)):
+            change = self._part(active).change(model, here, tool, load)
+            if change is None:
+                return None
+            moved = here + change.reshape(-1, 3)
+            if active >= self._faces.count_within(model, moved, tool, 0.0):
+                break
+        return change
 
-    def _move(
-        self,
-        model: BlockModel,
-        here: FloatArray,
-        tool: ToolSphere,
-        load: FloatArray,
-        change: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Gradient of the condensed energy (m,) and Newton's step (m,).
-
-        The contact's curvature is left out if the tangent with it is not positive.
-        """
-        force, tangent = self._contact(model, here + change.reshape(-1, 3), tool)
-        slope = self._stiffness @ change + load + force
-        try:
-            factor = cho_factor(self._stiffness + tangent, check_finite=False)
-            return slope, np.asarray(-cho_solve(factor, slope, check_finite=False))
-        except LinAlgError:
-            _, tangent = self._contact(model, here + change.reshape(-1, 3), tool, bending=False)
-            return slope, np.asarray(-np.linalg.solve(self._stiffness + tangent, slope))
-
-    def _energy(
-        self,
-        model: BlockModel,
-        here: FloatArray,
-        tool: ToolSphere,
-        load: FloatArray,
-        change: FloatArray,
-    ) -> float:
-        """Energy over E [m^3] of the condensed body and the contact."""
-        contact = contact_energy(
-            self._local,
-            model.areas[self._faces],
-            model.face.shapes,
-            model.face.gradients,
-            here + change.reshape(-1, 3),
-            tool.centre,
-            tool.radius,
-            False,
-            not model.dense,
-            CONTACT_STIFFNESS,
-        )
-        if model.friction_potential is not None:
-            contact += model.friction_potential.of(self._faces).energy(
-                self._local, model.face, here + change.reshape(-1, 3), tool.centre
+    def _part(self, active: int) -> _ActiveNodes:
+        """The contact on the last nodes, so many of them."""
+        if active not in self._parts:
+            share = self._share[-3 * active :, -3 * active :]
+            self._parts[active] = _ActiveNodes(
+                self._faces.between_last(active), self._factor, share
             )
-        return float(0.5 * change @ self._stiffness @ change + load @ change + contact)
+        return self._parts[active]
 
 
-def _dense_slots(local: IntArray, count: int) -> IntArray:
-    """Positions of the entries of each face's matrix in a dense matrix of all nodes (f, 3 b, 3 b).
+class _ActiveNodes:
+    """Contact on the last of the kept nodes; the others follow them.
 
-    They are -1 for nodes outside.
+    Args:
+        patch: sides between the last nodes.
+        factor: (m, m) upper Cholesky factor of the body's stiffness over E with the contact's
+            share.
+        share: (k, k) of the contact in it [m], which belongs to the last nodes alone.
     """
-    numbers = (3 * local[:, :, None] + np.arange(3)).reshape(len(local), -1)
-    return np.ascontiguousarray(numbers[:, :, None] * 3 * count + numbers[:, None, :]).astype(
-        np.int32
-    )
+
+    def __init__(self, patch: ContactPatch, factor: FloatArray, share: FloatArray) -> None:
+        self._first = first = len(factor) - len(share)
+        self._factor, last = np.asfortranarray(factor[:first, :first]), factor[first:, first:]
+        self._balance = ContactBalance(patch, last.T @ last - share)
+        self._response = factor[:first, first:]
+        if first:
+            self._response = solve_triangular(self._factor, self._response, check_finite=False)
+
+    def change(
+        self, model: BlockModel, here: FloatArray, tool: ToolSphere, load: FloatArray
+    ) -> FloatArray | None:
+        """The change of all kept unknowns (m,), as of `ContactBalance.change`."""
+        first, response = self._first, self._response
+        if not first:
+            return self._balance.change(model, here, tool, load)
+        near = self._balance.change(
+            model, here[first // 3 :], tool, load[first:] - response.T @ load[:first]
+        )
+        if near is None:
+            return None
+        far = cho_solve((self._factor, False), load[:first], check_finite=False)
+        return np.concatenate([-far - response @ near, near])
+
+
+def _kept_nodes(model: BlockModel, near: IntArray) -> IntArray:
+    """Nodes on which the body is condensed: those near the tool (k,) and more, so that the set
+    seldom changes.
+    """
+    top, mesh = model.topology, model.mesh
+    focus = mesh.near_focus[top.free[mesh.near_focus].all(axis=1)]
+    if np.isin(near, focus).all():
+        return focus
+    rest = mesh.nodes[near]
+    low = np.floor(rest.min(axis=0) / _CELL) * _CELL
+    high = np.ceil(rest.max(axis=0) / _CELL) * _CELL
+    surface = np.unique(top.surface)
+    surface = surface[top.free[surface].all(axis=1)]
+    inside = ((mesh.nodes[surface] >= low) & (mesh.nodes[surface] <= high)).all(axis=1)
+    return np.union1d(near, surface[inside])

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from palpate.fem.model import BlockModel, ToolSphere
+from palpate.fem.model import Assembly, BlockModel, ToolSphere
 from palpate.fem.modified_newton import ModifiedNewton
 from palpate.fem.newton import MAX_PENETRATION, Outcome, Solution, relative_residual, solve
 from palpate.foundation.arrays import FloatArray
@@ -93,7 +93,7 @@ def _move_in_stages(
     steps = max(1, int(np.ceil(float(np.linalg.norm(tool.centre - before.centre)) / FREE_STEP)))
     if steps == 1:
         near = quick_solver.solve(
-            model, tool, _predicted_positions(model, positions, before, tool), tolerance
+            model, tool, *_predicted_positions(model, positions, before, tool), tolerance
         )
         return (
             near
@@ -115,8 +115,8 @@ def _move_in_stages(
 
 def _predicted_positions(
     model: BlockModel, positions: FloatArray, before: ToolSphere, tool: ToolSphere
-) -> FloatArray:
-    """Positions (n, 3) [m] from which a step begins.
+) -> tuple[FloatArray, Assembly]:
+    """Positions (n, 3) [m] from which a step begins, and their residual.
 
     They are those given, or with the surface predicted along as the ball moves and grows, whichever
     has the smaller residual. A ball that retreats or shrinks loses contact with a body that stays
@@ -132,9 +132,9 @@ def _predicted_positions(
     )
     predicted = np.where(model.topology.free, positions + move, positions)
     there, here = (model.assemble(place, tool, tangent=False) for place in (predicted, positions))
-    return (
-        predicted if relative_residual(model, there) < relative_residual(model, here) else positions
-    )
+    if relative_residual(model, there) < relative_residual(model, here):
+        return predicted, there
+    return positions, here
 
 
 def _pass_stages(
@@ -155,7 +155,7 @@ def _pass_stages(
         near = None
         if quick_solver is not None:
             near = quick_solver.solve(
-                model, tool, _predicted_positions(model, positions, last, tool), required
+                model, tool, *_predicted_positions(model, positions, last, tool), required
             )
         solution = (
             near

@@ -131,8 +131,7 @@ class BlockModel:
     def factorise(self, data: FloatArray) -> None:
         """Factorise a tangent with these entries [m]; raises NotPositiveDefinite."""
         self.spend(1.0)
-        near = self.topology.unknown[self.mesh.near_focus].ravel()
-        self.topology.factor.factorise(data, near[near >= 0])
+        self.topology.factor.factorise(data)
 
     def harden(self, hardness: float) -> None:
         """Multiply the contact stiffness by this factor over its initial value [1]."""

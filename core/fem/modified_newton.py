@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.fem.contact_condensation import CondensedContact
-from palpate.fem.model import BlockModel, ToolSphere
+from palpate.fem.model import Assembly, BlockModel, ToolSphere
 from palpate.fem.newton import Outcome, Solution, contact_outcome, relative_residual
+from palpate.fem.secant_pairs import SecantPairs
 from palpate.foundation.arrays import FloatArray
 
 __all__ = ["ModifiedNewton"]
@@ -28,6 +29,7 @@ class ModifiedNewton:
 
     def __init__(self) -> None:
         self._condensed: CondensedContact | None = None
+        self._pairs = SecantPairs()
         self._failures = self._pause = 0
 
     @property
@@ -36,11 +38,23 @@ class ModifiedNewton:
         return self._failures > 0
 
     def solve(
-        self, model: BlockModel, tool: ToolSphere, start: FloatArray, tolerance: float
+        self,
+        model: BlockModel,
+        tool: ToolSphere,
+        start: FloatArray,
+        state: Assembly,
+        tolerance: float,
     ) -> Solution | None:
         """Find the equilibrium near `start` (n, 3) [m]; None if it takes a full Newton method.
 
         After repeated failures (as where a base comes loose) it skips some frames without trying.
+
+        Args:
+            model: the body.
+            tool: the tool.
+            start: positions to begin from.
+            state: assembled there; its tangent is not used.
+            tolerance: relative residual at which to stop.
         """
         if self._pause:
             self._pause -= 1
@@ -49,10 +63,13 @@ class ModifiedNewton:
         for attempt in range(_ATTEMPTS):
             condensed = self._condensed
             if attempt or condensed is None or not condensed.fits(model):
-                condensed = CondensedContact.at(model, positions, tool)
+                condensed, self._pairs = (
+                    CondensedContact.at(model, positions, tool),
+                    SecantPairs(),
+                )
             if condensed is None:
                 break
-            solution = self._steps(condensed, model, tool, positions, tolerance)
+            solution, state = self._steps(condensed, model, tool, (positions, state), tolerance)
             positions, taken = solution.positions, taken + solution.iterations
             if solution.converged:
                 self._condensed = condensed if solution.iterations <= _TIRED else None
@@ -70,27 +87,31 @@ class ModifiedNewton:
         condensed: CondensedContact,
         model: BlockModel,
         tool: ToolSphere,
-        positions: FloatArray,
+        start: tuple[FloatArray, Assembly],
         tolerance: float,
-    ) -> Solution:
-        """Step while the residual shrinks; the best positions found if that does not reach the
-        tolerance.
+    ) -> tuple[Solution, Assembly]:
+        """Step while the residual shrinks; the best positions found, and the state there, if that
+        does not reach the tolerance.
         """
-        state = model.assemble(positions, tool, tangent=False)
-        best, residual = state, relative_residual(model, state)
-        for number in range(_MOST_STEPS):
+        positions, best = start
+        residual, taken = relative_residual(model, best), 0
+        self._pairs.begin()
+        while True:
             if residual <= tolerance:
                 finite = bool(np.isfinite(model.energy(positions, tool)))
                 outcome = contact_outcome(model, tool, positions) if finite else Outcome.INVERTED
-                return Solution(positions, best.push, outcome, number, residual, best.penetration)
-            trial = condensed.step(model, positions, best.residual, tool)
-            if trial is None:
                 break
+            outcome = Outcome.ITERATIONS
+            plain = condensed.step(model, positions, best.residual, tool)
+            if plain is None:
+                break
+            trial = positions.copy()
+            trial[model.topology.free] += self._pairs.corrected(plain)
             state = model.assemble(trial, tool, tangent=False)
             now = relative_residual(model, state)
             if not now < _SHRINKING * residual:
                 break
-            positions, best, residual = trial, state, now
-        return Solution(
-            positions, best.push, Outcome.ITERATIONS, number, residual, best.penetration
-        )
+            positions, best, residual, taken = trial, state, now, taken + 1
+            if taken == _MOST_STEPS:
+                break
+        return Solution(positions, best.push, outcome, taken, residual, best.penetration), best

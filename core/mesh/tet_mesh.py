@@ -56,7 +56,7 @@ class TetMesh:
         tetrahedra: (e, 4) corners, of positive volume.
         held: (f,) True for sides of `sides_of(tetrahedra)` that are held.
         near_focus: nodes (k,) of the free surface that a tool may touch, of a mesh for one push;
-            forces on them are solved for faster.
+            a replay condenses the body on them.
     """
 
     corners: FloatArray

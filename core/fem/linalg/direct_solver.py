@@ -6,11 +6,41 @@ from typing import Protocol
 
 from palpate.foundation.arrays import FloatArray, IntArray
 
-__all__ = ["Factor", "NotPositiveDefinite"]
+__all__ = ["Condensation", "Factor", "NotPositiveDefinite"]
 
 
 class NotPositiveDefinite(Exception):
     """The matrix has no Cholesky factor, to the factor's precision."""
+
+
+class Condensation(Protocol):
+    """A matrix A of which all unknowns but a few are eliminated (static condensation).
+
+    With o the eliminated unknowns and c the kept ones it solves A x = b where the kept x_c are
+    determined by more than A: by contact.
+
+    Attributes:
+        matrix: (m, m) Schur complement A_cc - A_co A_oo^-1 A_oc, to the factor's precision.
+    """
+
+    matrix: FloatArray
+
+    @property
+    def stored(self) -> bool:
+        """Whether the factor is still stored; without it nothing can be solved."""
+        ...
+
+    def eliminate(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Eliminate unknowns of a right side b (n,).
+
+        Returns:
+            b_c - A_co A_oo^-1 b_o (m,), and the vector (n,) that `substitute` takes.
+        """
+        ...
+
+    def substitute(self, partial: FloatArray, values: FloatArray) -> FloatArray:
+        """Find the eliminated unknowns for values (m,) of the kept ones; returns all x (n,)."""
+        ...
 
 
 class Factor(Protocol):
@@ -25,13 +55,9 @@ class Factor(Protocol):
 
     generation: int
 
-    def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
-        """Factorise the matrix; raises NotPositiveDefinite.
-
-        Args:
-            data: entries of its upper triangle.
-            requested: (m,) unknowns between which `inverse_entries` should be fast; others stay
-                correct.
+    def factorise(self, data: FloatArray) -> None:
+        """Factorise the matrix with these entries of its upper triangle; raises
+        NotPositiveDefinite.
         """
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -45,9 +71,13 @@ class Factor(Protocol):
         """
         ...
 
-    def inverse_entries(self, unknowns: IntArray) -> FloatArray:
-        """Entries of the inverse (m, m) between these unknowns (m,), to the factor's precision.
+    def condense(self, data: FloatArray, unknowns: IntArray) -> Condensation:
+        """Condense a matrix on some of its unknowns; raises NotPositiveDefinite.
 
-        They are the responses to unit loads.
+        What is eliminated must be positive definite; the Schur complement need not be.
+
+        Args:
+            data: entries of its upper triangle.
+            unknowns: (m,) that are kept, one at least.
         """
         ...

@@ -5,14 +5,15 @@ from __future__ import annotations
 import ctypes
 import logging
 import math
-import weakref
+import sys
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from palpate.fem.linalg.direct_solver import NotPositiveDefinite
+from palpate.fem.linalg.direct_solver import Condensation, NotPositiveDefinite
+from palpate.fem.linalg.solved_condensation import SolvedCondensation
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.mkl_library import name_library
 
@@ -21,15 +22,17 @@ __all__ = ["Pardiso"]
 log = logging.getLogger(__name__)
 
 _POSITIVE_DEFINITE = 2
-_ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _RELEASE = 11, 22, 33, 331, -1
+_ANALYSE, _FACTORISE, _SOLVE, _FORWARD, _BACKWARD, _RELEASE = 11, 22, 33, 331, 333, -1
 _ZERO_PIVOT = -4
 _DOMAIN = 4
 """MKL's domain number of Pardiso, for thread settings."""
-_CHOSEN, _ORDERING, _ALGORITHM, _PRECISION, _PARTIAL = 0, 1, 23, 27, 30
-_NESTED_DISSECTION, _TWO_LEVEL, _SINGLE, _SPARSE_RIGHT_SIDES = 2, 1, 1, 1
+_CHOSEN, _ORDERING, _ALGORITHM, _PRECISION, _SCHUR = 0, 1, 23, 27, 35
+_NESTED_DISSECTION, _TWO_LEVEL, _SINGLE, _KEPT = 2, 1, 1, 2
 _NONE = np.empty(0, dtype=np.int64)
-_SAME = {np.dtype(np.float32): 1e-3, np.dtype(np.float64): 1e-9}
-"""Fast inverse entries are correct to this share of the largest [1]."""
+_CORRECT = {np.dtype(np.float32): 1e-3, np.dtype(np.float64): 1e-9}
+"""A condensation may leave this share of the load [1]; the factor's precision is far better."""
+_CONDENSED_SETS = 2
+"""Sets of unknowns whose analysis is stored."""
 _SETTLED, _MOST_ROUNDS = 1e-5, 10
 """A solution is refined until it changes by no more than this share of it, and at most so many
 rounds; each round reduces the error by the same factor."""
@@ -64,11 +67,16 @@ class _Handle:
 
     Args:
         pattern: as of `Pardiso`.
-        requested: (m,) unknowns between which entries of the inverse are needed.
         single: precision.
+        kept: (m,) unknowns that are not eliminated: the factorisation returns the Schur complement
+            on them.
+
+    Attributes:
+        generation: number of the factor that is stored.
+        trusted: whether its results were checked, and right; None before the check.
     """
 
-    def __init__(self, pattern: sp.csr_matrix, requested: IntArray, single: bool) -> None:
+    def __init__(self, pattern: sp.csr_matrix, single: bool, kept: IntArray = _NONE) -> None:
         self.kind: np.dtype[Any] = np.dtype(np.float32 if single else np.float64)
         self.entries = np.asarray(pattern.data, dtype=self.kind)
         self.size = pattern.shape[0]
@@ -80,43 +88,37 @@ class _Handle:
         # three times as long with them.
         self.options[_CHOSEN], self.options[_ORDERING] = 1, _NESTED_DISSECTION
         self.options[_PRECISION] = _SINGLE if single else 0
+        self.options[_ALGORITHM] = _TWO_LEVEL
         self.order = np.zeros(self.size, dtype=np.int32)
-        self.requested = np.zeros(self.size, dtype=bool)
-        self.requested[requested] = True
-        if len(requested):
-            # MKL's usual factorisation solves sparse right sides wrongly, and takes ten times as
-            # long.
-            self.options[_ALGORITHM] = _TWO_LEVEL
-        self.call = _pardiso()
-        self.run(_ANALYSE, np.zeros(self.size), requested)
+        self.order[kept] = 1
+        self.options[_SCHUR] = _KEPT if len(kept) else 0
+        self.call, self.kept = _pardiso(), kept
+        self.generation, self.trusted = 0, None if len(kept) else True
+        self.run(_ANALYSE)
 
-    def run(self, phase: int, right: FloatArray, sparse: IntArray = _NONE) -> FloatArray:
+    def run(self, phase: int, right: FloatArray | None = None) -> FloatArray:
         """Carry out a phase.
 
         Args:
             phase: MKL's number of it.
-            right: right sides (n,) or (n, m).
-            sparse: unknowns outside which the right sides are zero, and for which alone the
-                solution is correct. They are among the requested ones, which must be passed to
-                analysis and factorisation.
+            right: right sides (n,) or (n, m); none are needed unless the phase solves.
 
         Returns:
-            the solution (n,) or (n, m) in column order and this precision, if the phase has one.
+            the solution (n,) or (n, m) in column order and this precision; of the factorisation
+                the Schur complement (k, k), where unknowns are kept.
         """
-        self.options[_PARTIAL] = _SPARSE_RIGHT_SIDES if len(sparse) else 0
-        self.order[:] = 0
-        self.order[sparse] = 1
+        shape = (len(self.kept),) * 2 if right is None else right.shape
         solution, given, error = (
-            _aligned_array(right.shape, self.kind),
-            _aligned_array(right.shape, self.kind),
+            _aligned_array(shape, self.kind),
+            _aligned_array((self.size,) if right is None else shape, self.kind),
             ctypes.c_int32(0),
         )
-        given[...] = right
+        given[...] = 0.0 if right is None else right
         number = [
             ctypes.byref(ctypes.c_int32(value))
             for value in (1, _POSITIVE_DEFINITE, phase, self.size)
         ]
-        columns = ctypes.byref(ctypes.c_int32(1 if right.ndim == 1 else right.shape[1]))
+        columns = 1 if right is None or right.ndim == 1 else right.shape[1]
         self.call(
             self.memory.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),
             number[0],
@@ -128,7 +130,7 @@ class _Handle:
             self.rows.ctypes.data_as(_INTEGERS),
             self.columns.ctypes.data_as(_INTEGERS),
             self.order.ctypes.data_as(_INTEGERS),
-            columns,
+            ctypes.byref(ctypes.c_int32(columns)),
             self.options.ctypes.data_as(_INTEGERS),
             ctypes.byref(ctypes.c_int32(0)),
             given.ctypes.data_as(_ANY),
@@ -141,9 +143,45 @@ class _Handle:
             raise RuntimeError(f"MKL Pardiso failed in phase {phase} with error {error.value}")
         return np.asarray(solution)
 
+    def factorise(self, data: FloatArray) -> FloatArray:
+        """Factorise a matrix with these entries; returns the Schur complement, see `run`."""
+        self.generation += 1
+        self.entries[:] = data
+        return self.run(_FACTORISE)
 
-def _release(handle: _Handle) -> None:
-    handle.run(_RELEASE, np.zeros(handle.size))
+    def __del__(self) -> None:
+        # At interpreter exit the memory goes anyway, and the library may be gone first.
+        if not sys.is_finalizing():
+            self.run(_RELEASE)
+
+
+class _MklCondensation:
+    """A `Condensation` by MKL: the kept unknowns are not eliminated.
+
+    Args:
+        handle: of the matrix, factorised with these unknowns kept.
+        matrix: (m, m) Schur complement.
+    """
+
+    def __init__(self, handle: _Handle, matrix: FloatArray) -> None:
+        self._handle, self._generation = handle, handle.generation
+        self.matrix = np.asarray(matrix, dtype=float)
+
+    @property
+    def stored(self) -> bool:
+        """Whether the factor is still stored."""
+        return self._handle.generation == self._generation
+
+    def eliminate(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Eliminate; see `Condensation`."""
+        partial = self._handle.run(_FORWARD, right)
+        return np.asarray(partial[self._handle.kept], dtype=float), partial
+
+    def substitute(self, partial: FloatArray, values: FloatArray) -> FloatArray:
+        """Substitute back; see `Condensation`."""
+        whole = partial.copy()
+        whole[self._handle.kept] = values
+        return np.asarray(self._handle.run(_BACKWARD, whole), dtype=float)
 
 
 class Pardiso:
@@ -159,74 +197,88 @@ class Pardiso:
         single: precision of the factor.
     """
 
-    _handle: _Handle
-
     def __init__(self, pattern: sp.csr_matrix, single: bool = False) -> None:
         self._matrix, self._single = pattern, single
-        self._idle = np.zeros(pattern.shape[0])
-        self.generation = 0
-        self._trusted, self._current = True, False
+        self.generation, self._current = 0, False
         _pardiso()  # where it is missing, that is said here and now
-        self._requested: IntArray | None = None
+        self._whole: _Handle | None = None
+        self._condensing: dict[bytes, _Handle] = {}
 
-    def _analyse(self, requested: IntArray) -> None:
-        """Analyse the pattern for fast inverse entries between these unknowns (m,).
+    def factorise(self, data: FloatArray) -> None:
+        """Factorise the matrix with these entries of its upper triangle; raises
+        NotPositiveDefinite.
 
-        The elimination order depends on them.
+        An existing factor of exactly these entries is kept.
         """
-        self._handle, self._requested, self._checked = (
-            _Handle(self._matrix, requested, self._single),
-            requested,
-            False,
-        )
-        self._forget = weakref.finalize(self, _release, self._handle)
-        # At interpreter exit the memory goes anyway, and the library may be gone first.
-        self._forget.atexit = False
-
-    def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
-        """Factorise the matrix; raises NotPositiveDefinite.
-
-        Requested inverse entries take a fifth of the time; requesting others than the last time
-        takes an analysis. An existing factor of exactly these entries is kept.
-
-        Args:
-            data: entries of its upper triangle.
-            requested: (m,) unknowns between which `inverse_entries` should be fast.
-        """
-        current = requested if requested is not None and self._trusted else _NONE
-        same = self._requested is not None and np.array_equal(current, self._requested)
-        if same and self._current and np.array_equal(data, self._matrix.data):
+        if self._current and np.array_equal(data, self._matrix.data):
             return
         self.generation += 1
         self._current = False
-        if not same:
-            if self._requested is not None:
-                self._forget()
-            self._analyse(current)
+        if self._whole is None:
+            self._whole = _Handle(self._matrix, self._single)
         self._matrix.data[:] = data
-        self._handle.entries[:] = data
-        self._handle.run(_FACTORISE, self._idle, current)
+        self._whole.factorise(data)
         self._current = True
+
+    def condense(self, data: FloatArray, unknowns: IntArray) -> Condensation:
+        """Condense the matrix with these entries; see `Factor`.
+
+        The analysis, which depends on the unknowns, is stored for the last sets of them.
+        """
+        if not len(unknowns):
+            raise ValueError("there are no unknowns to condense on; name one at least")
+        key = np.asarray(unknowns, dtype=np.int64).tobytes()
+        handle = self._condensing.pop(key, None) or _Handle(
+            self._matrix, self._single, np.asarray(unknowns)
+        )
+        self._condensing[key] = handle
+        if len(self._condensing) > _CONDENSED_SETS:
+            del self._condensing[next(iter(self._condensing))]
+        if handle.trusted is not False:
+            made = _MklCondensation(handle, handle.factorise(data))
+            if handle.trusted is None:
+                handle.trusted = self._is_correct(made, data, unknowns)
+            if handle.trusted:
+                return made
+        self.factorise(data)
+        return SolvedCondensation(self, self._matrix.shape[0], unknowns)
+
+    def _is_correct(self, made: Condensation, data: FloatArray, unknowns: IntArray) -> bool:
+        """Whether a condensation has a known solution; checked once after each analysis."""
+        upper = sp.csr_matrix(
+            (data, self._matrix.indices, self._matrix.indptr), shape=self._matrix.shape
+        )
+        known = np.cos(np.arange(upper.shape[0], dtype=float))
+        right = _times(upper, known)
+        reduced, partial = made.eliminate(right)
+        left = [
+            reduced - made.matrix @ known[unknowns],
+            _times(upper, made.substitute(partial, known[unknowns])) - right,
+        ]
+        most = _CORRECT[np.dtype(np.float32 if self._single else np.float64)]
+        correct = max(np.abs(part).max() for part in left) <= most * np.abs(right).max()
+        if not correct:
+            log.warning(
+                "MKL's Schur complements are wrong on this machine: contact is condensed without "
+                "them, which takes longer"
+            )
+        return bool(correct)
 
     def approximate(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides, to the factor's precision."""
-        return np.ascontiguousarray(self._handle.run(_SOLVE, right), dtype=float)
+        if self._whole is None:
+            raise RuntimeError("nothing has been factorised yet")
+        return np.ascontiguousarray(self._whole.run(_SOLVE, right), dtype=float)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve for one (n,) or several (n, m) right sides with the last factor."""
         solution = self.approximate(right)
         for _ in range(_MOST_ROUNDS if self._single else 0):
-            change = self.approximate(right - self._times(solution))
+            change = self.approximate(right - _times(self._matrix, solution))
             solution += change
             if (np.abs(change).max(axis=0) <= _SETTLED * np.abs(solution).max(axis=0)).all():
                 return solution
         return self._in_double(right) if self._single else solution
-
-    def _times(self, vectors: FloatArray) -> FloatArray:
-        """Multiply the matrix by one (n,) or several (n, m) vectors."""
-        upper = self._matrix
-        diagonal = upper.data[upper.indptr[:-1]]
-        return np.asarray(upper @ vectors + upper.T @ vectors - (diagonal * vectors.T).T)
 
     def _in_double(self, right: FloatArray) -> FloatArray:
         """Solve in double precision from now on, for matrices too ill-conditioned for single."""
@@ -234,47 +286,15 @@ class Pardiso:
             "a stiffness matrix is too ill-conditioned for single precision: solving in double "
             "takes about twice as long"
         )
-        self._forget()
-        self._single, self._current, requested = False, False, self._requested
-        self._requested = None
-        self.factorise(self._matrix.data, requested)
+        self._single, self._current, self._whole = False, False, None
+        self._condensing.clear()
+        self.factorise(self._matrix.data)
         return self.solve(right)
 
-    def inverse_entries(self, unknowns: IntArray) -> FloatArray:
-        """Entries of the inverse (m, m) between these unknowns (m,).
 
-        With A = L L^T they are those of Y^T Y, Y = L^-1 of unit loads. Half a solution is half the
-        work, and most rows of Y are zero. For requested unknowns MKL itself skips the zeros.
-        """
-        if not len(unknowns):
-            return np.empty((0, 0))
-        unit = np.zeros((self._handle.size, len(unknowns)), dtype=self._handle.kind, order="F")
-        unit[unknowns, np.arange(len(unknowns))] = 1.0
-        if self._handle.requested[unknowns].all():
-            solution = self._handle.run(_SOLVE, unit, unknowns)[unknowns]
-            if self._is_correct(solution, unknowns):
-                return np.asarray(solution, dtype=float)
-        half = self._handle.run(_FORWARD, unit)
-        filled = half[half.any(axis=1)]
-        return np.asarray(filled.T @ filled, dtype=float)
-
-    def _is_correct(self, solution: FloatArray, unknowns: IntArray) -> bool:
-        """Whether fast inverse entries (m, m) agree with a full solution.
-
-        One column is checked once after each analysis.
-        """
-        if not self._checked:
-            load = self._idle.copy()
-            load[unknowns[0]] = 1.0
-            whole = self.approximate(load)[unknowns]
-            self._checked = True
-            self._trusted = bool(
-                np.abs(solution[:, 0] - whole).max()
-                <= _SAME[self._handle.kind] * np.abs(whole).max()
-            )
-            if not self._trusted:
-                log.warning(
-                    "MKL's answers to sparse loads are wrong on this machine: they are done "
-                    "without, which takes longer"
-                )
-        return self._trusted
+def _times(upper: sp.csr_matrix, vectors: FloatArray) -> FloatArray:
+    """Multiply a symmetric matrix, given by its upper triangle, by one (n,) or several (n, m)
+    vectors.
+    """
+    diagonal = upper.data[upper.indptr[:-1]]
+    return np.asarray(upper @ vectors + upper.T @ vectors - (diagonal * vectors.T).T)

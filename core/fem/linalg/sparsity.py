@@ -5,9 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 
 from palpate.fem.linalg.direct_solver import Factor
 from palpate.fem.linalg.superlu import SuperLUFactor
@@ -73,32 +75,65 @@ def upper_pattern(elements: IntArray, unknown: IntArray) -> tuple[sp.csr_matrix,
         upper triangle in CSR form; (e, 3a, 3a) slots, -1 below the diagonal and for given
             displacements.
     """
-    numbers = unknown[elements].reshape(len(elements), -1)
-    rows = np.repeat(numbers, numbers.shape[1], axis=1).ravel()
-    columns = np.tile(numbers, (1, numbers.shape[1])).ravel()
-    used = (rows >= 0) & (columns >= rows)
-    count = int(unknown.max()) + 1
-    keys, inverse = np.unique(
-        rows[used].astype(np.int64) * count + columns[used], return_inverse=True
-    )
-    slots = np.full(len(rows), -1, dtype=np.int32)
-    slots[used] = inverse
-    indptr = np.searchsorted(keys // count, np.arange(count + 1))
-    pattern = sp.csr_matrix((np.zeros(len(keys)), keys % count, indptr), shape=(count, count))
-    return pattern, slots.reshape(len(elements), numbers.shape[1], numbers.shape[1])
+    nodes, count = len(unknown), int(unknown.max()) + 1
+    rows = np.repeat(elements, elements.shape[1], axis=1).ravel()
+    columns = np.tile(elements, (1, elements.shape[1])).ravel()
+    ones = np.ones(len(rows), dtype=np.int8)
+    neighbours = sp.csr_matrix((ones, (rows, columns)), shape=(nodes, nodes))
+    starts, indices = _upper_rows(neighbours.indptr, neighbours.indices, unknown, count)
+    pattern = sp.csr_matrix((np.zeros(len(indices)), indices, starts), shape=(count, count))
+    return pattern, face_slots(pattern, elements, unknown)
 
 
 def face_slots(pattern: sp.csr_matrix, faces: IntArray, unknown: IntArray) -> IntArray:
     """Slots as of `upper_pattern`, for faces (f, a) whose nodes share an element."""
     numbers = unknown[faces].reshape(len(faces), -1)
-    rows = np.repeat(numbers, numbers.shape[1], axis=1).ravel()
-    columns = np.tile(numbers, (1, numbers.shape[1])).ravel()
-    used = (rows >= 0) & (columns >= rows)
-    count = pattern.shape[0]
-    keys = (
-        np.repeat(np.arange(count, dtype=np.int64), np.diff(pattern.indptr)) * count
-        + pattern.indices
-    )
-    slots = np.full(len(rows), -1, dtype=np.int32)
-    slots[used] = np.searchsorted(keys, rows[used].astype(np.int64) * count + columns[used])
-    return slots.reshape(len(faces), numbers.shape[1], numbers.shape[1])
+    slots: IntArray = _find(numbers, pattern.indptr, pattern.indices)
+    return slots
+
+
+@njit(cache=True)
+def _upper_rows(starts: Any, neighbours: Any, unknown: Any, count: int) -> Any:
+    """Row starts and sorted columns of the upper triangle of the unknowns' pattern.
+
+    Args:
+        starts: (n + 1,) of each node's neighbours.
+        neighbours: nodes that share an element, the node itself among them.
+        unknown: (n, 3) as of `upper_pattern`.
+        count: of the unknowns.
+    """
+    lengths = np.zeros(count + 1, dtype=np.int32)
+    indices = np.empty(9 * len(neighbours), dtype=np.int32)
+    node_of = np.empty(count, dtype=np.int64)
+    for node in range(unknown.shape[0]):
+        for axis in range(unknown.shape[1]):
+            if unknown[node, axis] >= 0:
+                node_of[unknown[node, axis]] = node
+    filled = 0
+    for row in range(count):
+        begin = filled
+        for place in range(starts[node_of[row]], starts[node_of[row] + 1]):
+            for axis in range(unknown.shape[1]):
+                column = unknown[neighbours[place], axis]
+                if column >= row:
+                    indices[filled] = column
+                    filled += 1
+        indices[begin:filled].sort()
+        lengths[row + 1] = filled
+    return lengths, indices[:filled].copy()
+
+
+@njit(cache=True)
+def _find(numbers: Any, starts: Any, indices: Any) -> Any:
+    """Slots (f, m, m) between the unknowns (f, m) of each face, see `upper_pattern`."""
+    slots = np.full((numbers.shape[0], numbers.shape[1], numbers.shape[1]), -1, dtype=np.int32)
+    for f in range(numbers.shape[0]):
+        for i in range(numbers.shape[1]):
+            row = numbers[f, i]
+            if row < 0:
+                continue
+            columns = indices[starts[row] : starts[row + 1]]
+            for j in range(numbers.shape[1]):
+                if numbers[f, j] >= row:
+                    slots[f, i, j] = starts[row] + np.searchsorted(columns, numbers[f, j])
+    return slots

@@ -6,7 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
-from palpate.fem.linalg.direct_solver import NotPositiveDefinite
+from palpate.fem.linalg.direct_solver import Condensation, NotPositiveDefinite
+from palpate.fem.linalg.solved_condensation import SolvedCondensation
 from palpate.foundation.arrays import FloatArray, IntArray
 
 __all__ = ["SuperLUFactor"]
@@ -34,11 +35,9 @@ class SuperLUFactor:
         self._lu: SuperLU | None = None
         self.generation = 0
 
-    def factorise(self, data: FloatArray, requested: IntArray | None = None) -> None:
+    def factorise(self, data: FloatArray) -> None:
         """Factorise the matrix with these entries of its upper triangle; raises
         NotPositiveDefinite.
-
-        `requested` has no effect.
         """
         self.generation += 1
         matrix = sp.csc_matrix(
@@ -70,6 +69,7 @@ class SuperLUFactor:
         """Solve like `solve`: the factor has double precision."""
         return self.solve(right)
 
-    def inverse_entries(self, unknowns: IntArray) -> FloatArray:
-        """Entries of the inverse (m, m) between these unknowns (m,)."""
-        return self.solve(np.eye(self._shape[0])[:, unknowns])[unknowns]
+    def condense(self, data: FloatArray, unknowns: IntArray) -> Condensation:
+        """Condense the matrix with these entries; see `Factor`. All of it must be positive."""
+        self.factorise(data)
+        return SolvedCondensation(self, self._shape[0], unknowns)

@@ -28,7 +28,10 @@ def test_tangent_is_factorised_once_until_another_replaces_it(monkeypatch, pushe
     other = block.step(poke(3e-3), frame)
     made = sum(tangents)
     assert made > 1
-    assert np.allclose(displacement_changes(block, frame, steps), first, rtol=1e-8, atol=1e-15)
-    assert sum(tangents) == made + 1
+    # A step of the replay condenses its tangent apart.
+    assert np.array_equal(displacement_changes(block, frame, steps), first)
+    assert sum(tangents) == made
     elsewhere = displacement_changes(block, other, steps)
-    assert sum(tangents) == made + 2 and not np.allclose(elsewhere, first, rtol=1e-3)
+    assert sum(tangents) == made + 1 and not np.allclose(elsewhere, first, rtol=1e-3)
+    assert np.allclose(displacement_changes(block, frame, steps), first, rtol=1e-8, atol=1e-15)
+    assert sum(tangents) == made + 2

@@ -72,76 +72,91 @@ def _grid(count: int) -> sp.csr_matrix:
 
 
 @EACH
-def test_inverse_entries_are_correct_whether_requested_or_not(solver):
-    upper = _grid(9)
-    factor, inverse = factor_of(upper.copy(), solver), np.linalg.inv(_whole(upper))
-    requested, others = np.arange(700, 729), np.array([5, 300, 720])
-    for wanted in (None, requested, others, np.empty(0, dtype=int)):
+def test_condensed_matrix_is_the_schur_complement_and_solves_with_any_values(solver):
+    upper, right = _grid(9), np.random.default_rng(1).normal(size=729)
+    factor, whole = factor_of(upper.copy(), solver), _whole(upper)
+    for kept in (np.arange(700, 729), np.array([300, 5, 720]), np.array([8])):
+        left_out = np.setdiff1d(np.arange(729), kept)
+        inner, across = whole[np.ix_(left_out, left_out)], whole[np.ix_(left_out, kept)]
+        wanted = whole[np.ix_(kept, kept)] - across.T @ np.linalg.solve(inner, across)
         for scale in (1.0, 3.0):
-            factor.factorise(scale * upper.data, wanted)
-            for unknowns in (
-                requested,
-                requested[4:9],
-                others,
-                np.arange(695, 710),
-                np.empty(0, dtype=int),
-            ):
-                assert np.allclose(
-                    scale * factor.inverse_entries(unknowns),
-                    inverse[np.ix_(unknowns, unknowns)],
-                    atol=1e-13,
-                )
-            right = np.ones((len(inverse), 2))
-            assert np.allclose(scale * factor.solve(right), inverse @ right, atol=1e-11)
+            made = factor.condense(scale * upper.data, kept)
+            assert np.allclose(made.matrix, scale * wanted, atol=1e-12)
+            reduced, partial = made.eliminate(right)
+            for values in (np.linalg.solve(made.matrix, reduced), np.cos(kept)):
+                found = made.substitute(partial, values)
+                assert np.allclose(found[kept], values, atol=1e-12)
+                assert np.allclose((scale * whole @ found)[left_out], right[left_out], atol=1e-11)
+            assert made.stored
+    factor.condense(2 * upper.data, kept)
+    assert not made.stored
 
 
-def test_elimination_order_does_not_depend_on_earlier_requests():
+@EACH
+def test_condensation_leaves_the_factor_of_the_whole_matrix_correct(solver):
+    upper, kept = _grid(5), np.arange(40)
+    factor = factor_of(upper.copy(), solver)
+    for scale in (1.0, 2.0):
+        factor.factorise(scale * upper.data)
+        assert np.allclose(scale * _whole(upper) @ factor.solve(np.ones(125)), 1.0, atol=1e-12)
+        factor.condense(5 * upper.data, kept)
+    factor.factorise(2 * upper.data)
+    assert np.allclose(2 * _whole(upper) @ factor.solve(np.ones(125)), 1.0, atol=1e-12)
+
+
+@EACH
+def test_indefinite_matrix_is_not_condensed(solver):
+    upper = _grid(5)
+    with pytest.raises(NotPositiveDefinite):
+        factor_of(upper.copy(), solver).condense(-upper.data, np.arange(40))
+
+
+def test_elimination_order_does_not_depend_on_earlier_matrices():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
     upper, right = _grid(9), np.random.default_rng(1).normal(size=729)
-    requested, others = np.arange(700, 729), np.arange(50)
+    kept, others = np.arange(700, 729), np.arange(50)
     fresh, used = pardiso.Pardiso(upper.copy()), pardiso.Pardiso(upper.copy())
-    for wanted in (others, None, requested):
-        used.factorise(upper.data, wanted)
-    fresh.factorise(upper.data, requested)
-    assert np.array_equal(fresh.solve(right), used.solve(right))
-    assert np.array_equal(fresh.inverse_entries(requested), used.inverse_entries(requested))
+    used.factorise(upper.data)
+    for unknowns in (others, np.arange(9), kept, np.arange(7)):
+        used.condense(3 * upper.data, unknowns)
+    one, other = (factor.condense(upper.data, kept) for factor in (fresh, used))
+    assert np.array_equal(one.matrix, other.matrix)
+    assert np.array_equal(one.eliminate(right)[1], other.eliminate(right)[1])
 
 
-def test_wrong_sparse_solutions_are_logged_and_avoided(monkeypatch, caplog):
+def test_wrong_schur_complements_are_logged_and_avoided(monkeypatch, caplog):
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
-    upper, requested = _grid(7), np.arange(300, 343)
+    upper, kept = _grid(7), np.arange(300, 343)
     factor, inverse = pardiso.Pardiso(upper.copy()), np.linalg.inv(_whole(upper))
     carry_out = pardiso._Handle.run
 
-    def wrong(handle, phase, right, sparse=pardiso._NONE):
-        found = carry_out(handle, phase, right, sparse)
-        return 1.001 * found if phase == pardiso._SOLVE and len(sparse) else found
+    def wrong(handle, phase, right=None):
+        found = carry_out(handle, phase, right)
+        return 1.001 * found if phase == pardiso._FORWARD else found
 
     monkeypatch.setattr(pardiso._Handle, "run", wrong)
-    for _ in range(2):
-        factor.factorise(upper.data, requested)
+    for scale in (1.0, 3.0):
+        made = factor.condense(scale * upper.data, kept)
+        reduced, partial = made.eliminate(np.ones(343))
+        values = np.linalg.solve(made.matrix, reduced)
+        assert np.allclose(scale * values, inverse[kept].sum(axis=1), atol=1e-12)
         assert np.allclose(
-            factor.inverse_entries(requested), inverse[np.ix_(requested, requested)], atol=1e-13
+            scale * made.substitute(partial, values), inverse.sum(axis=1), atol=1e-12
         )
     assert caplog.text.count("wrong on this machine") == 1
 
 
 def test_factor_is_kept_for_equal_entries_and_a_failed_one_is_not():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
-    upper, requested = _grid(7), np.arange(300, 343)
+    upper = _grid(7)
     factor, numbers, indefinite = pardiso.Pardiso(upper.copy()), [], -upper.data
-    for data, wanted in (
-        (upper.data, requested),
-        (upper.data.copy(), requested),
-        (2 * upper.data, requested),
-        (2 * upper.data, None),
-    ):
-        factor.factorise(data, wanted)
+    for data in (upper.data, upper.data.copy(), 2 * upper.data):
+        factor.factorise(data)
         numbers.append(factor.generation)
         assert np.allclose(
             data[0] / upper.data[0] * _whole(upper) @ factor.solve(np.ones(343)), 1.0, atol=1e-12
         )
-    assert numbers == [1, 1, 2, 3]
+    assert numbers == [1, 1, 2]
     for _ in range(2):
         with pytest.raises(NotPositiveDefinite):
             factor.factorise(indefinite)
@@ -149,28 +164,22 @@ def test_factor_is_kept_for_equal_entries_and_a_failed_one_is_not():
 
 def test_single_precision_factor_solves_to_double_precision():
     pardiso = pytest.importorskip("palpate.fem.linalg.pardiso")
-    upper, requested, right = (
+    upper, kept, right = (
         _grid(9),
         np.arange(700, 729),
         np.random.default_rng(3).normal(size=(729, 3)),
     )
     factor, inverse = pardiso.Pardiso(upper.copy(), single=True), np.linalg.inv(_whole(upper))
-    for wanted in (None, requested):
-        for scale in (1.0, 3.0):
-            factor.factorise(scale * upper.data, wanted)
-            near, exact = factor.approximate(right), factor.solve(right)
-            assert (
-                1e-9 < np.abs(scale * near - inverse @ right).max() < 1e-5
-            )  # the factor is no double's
-            assert np.abs(scale * exact - inverse @ right).max() < 1e-12
-            assert np.abs(scale * factor.solve(right[:, 0]) - inverse @ right[:, 0]).max() < 1e-12
-            assert (
-                np.abs(
-                    scale * factor.inverse_entries(requested)
-                    - inverse[np.ix_(requested, requested)]
-                ).max()
-                < 1e-6
-            )
+    for scale in (1.0, 3.0):
+        factor.factorise(scale * upper.data)
+        near, exact = factor.approximate(right), factor.solve(right)
+        # the factor is no double's
+        assert 1e-9 < np.abs(scale * near - inverse @ right).max() < 1e-5
+        assert np.abs(scale * exact - inverse @ right).max() < 1e-12
+        assert np.abs(scale * factor.solve(right[:, 0]) - inverse @ right[:, 0]).max() < 1e-12
+        made = factor.condense(scale * upper.data, kept)
+        off = np.abs(scale * np.linalg.inv(made.matrix) - inverse[np.ix_(kept, kept)]).max()
+        assert 1e-12 < off < 1e-6
     with pytest.raises(NotPositiveDefinite):
         factor.factorise(-upper.data)
 
