@@ -101,9 +101,7 @@ def _open(folder: str, sequence: str, clouds: tuple[int, ...], model: str) -> No
     open_resolver(folder, sequence, clouds, model)
 
 
-def _beginnings(
-    folder: str, sequence: str, clouds: tuple[int, ...], model: str
-) -> dict[str, Any]:
+def _beginnings(folder: str, sequence: str, clouds: tuple[int, ...], model: str) -> dict[str, Any]:
     from palpate.recording.resolve_frame import open_resolver
 
     resolver = open_resolver(folder, sequence, clouds, model)

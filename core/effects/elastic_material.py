@@ -49,9 +49,7 @@ def inclusion_grid(setup: Setup) -> tuple[Inclusion, ...]:
     if not body.is_block:
         inside = body.outside(np.array(grid)) < 0
         grid = [place for place, kept in zip(grid, inside, strict=True) if kept] or grid
-    return tuple(
-        Inclusion(x=x, y=y, z=z, radius=7e-3, stiffness_ratio=5.0) for x, y, z in grid
-    )
+    return tuple(Inclusion(x=x, y=y, z=z, radius=7e-3, stiffness_ratio=5.0) for x, y, z in grid)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,12 +137,21 @@ class StiffInclusion(Effect):
         inclusions = (*setup.material.inclusions, self.inclusion)
         return replace(setup, material=replace(setup.material, inclusions=inclusions))
 
+    def located(self, setup: Setup) -> dict[str, Any]:
+        """Return `depth`: of the centre below the nearest free surface [m], of a free form, whose
+        top is elsewhere at each place.
+        """
+        if setup.geometry.is_block:
+            return {}
+        depth = -setup.geometry.facing_free(np.array([[self.x, self.y, self.z]]))[0][0]
+        return {"depth": {"value": round(float(depth), 5), "unit": "m"}}
+
     @classmethod
     def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
         kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
         across, depth = quantity(2 * values["radius"], "m"), values.get("depth")
         if depth is not None:
-            # Found from forces alone: the depth is that below the nearest skin.
+            # Of a free form, or found from forces alone: the depth is that below the nearest skin.
             return f"a {kind} lump, {across} across, its centre {depth} under the surface"
         place = f", {quantity(size[2] - values['z'], 'm')} under the top" if size else ""
         return f"a {kind} lump, {across} across{place}"

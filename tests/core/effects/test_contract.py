@@ -421,6 +421,4 @@ def test_families_have_at_least_two_members():
 
 def test_direction_is_said_to_the_degree() -> None:
     said = Anisotropy.phrase({"stiffness_ratio": 2.8, "direction": math.radians(106.9)})
-    assert said.endswith(
-        "2.8 times as stiff along one direction as across, 107° from the x axis"
-    )
+    assert said.endswith("2.8 times as stiff along one direction as across, 107° from the x axis")
