@@ -139,12 +139,21 @@ class StiffInclusion(Effect):
         inclusions = (*setup.material.inclusions, self.inclusion)
         return replace(setup, material=replace(setup.material, inclusions=inclusions))
 
+    def located(self, setup: Setup) -> dict[str, Any]:
+        """Return `depth`: of the centre below the nearest free surface [m], of a free form, whose
+        top is elsewhere at each place.
+        """
+        if setup.geometry.is_block:
+            return {}
+        depth = -setup.geometry.facing_free(np.array([[self.x, self.y, self.z]]))[0][0]
+        return {"depth": {"value": round(float(depth), 5), "unit": "m"}}
+
     @classmethod
     def phrase(cls, values: Mapping[str, Any], size: Sequence[float] | None = None) -> str:
         kind = "stiff" if values["stiffness_ratio"] >= 1.0 else "soft"
         across, depth = quantity(2 * values["radius"], "m"), values.get("depth")
         if depth is not None:
-            # Found from forces alone: the depth is that below the nearest skin.
+            # Of a free form, or found from forces alone: the depth is that below the nearest skin.
             return f"a {kind} lump, {across} across, its centre {depth} under the surface"
         place = f", {quantity(size[2] - values['z'], 'm')} under the top" if size else ""
         return f"a {kind} lump, {across} across{place}"

@@ -25,8 +25,8 @@ class Gravity(Effect):
     needs_fine_mesh = True
     told_apart_by = MappingProxyType(
         {
-            "camera_registration": "record the untouched phantom again from another side, or turned "
-            "on its side",
+            "camera_registration": "record the untouched phantom again from another side, or "
+            "turned on its side",
             "geometry_scale": MEASURE_SIZE,
         }
     )

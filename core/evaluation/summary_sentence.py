@@ -38,14 +38,20 @@ def summary_sentence(ladder: Mapping[str, Any]) -> str:
     alone = not any(rung["network"] is None for rung in ladder["rungs"][1:])
     kind = "the error that moves with the tool" if alone else "the error that can be removed"
     first, *rest = names
-    text = f"{_WHO[first]} removes {_shares(first, both)} of {kind}{_where(parts)}"
-    more = ", ".join(f"{_WHO[name]} {_shares(name, both)}" for name in rest)
+    worse = all(part["errors"][first]["removed"]["value"] <= -0.005 for part in both)
+    change = (
+        f"adds {_shares(first, both, -1)} to" if worse else f"removes {_shares(first, both)} of"
+    )
+    text = f"{_WHO[first]} {change} {kind}{_where(parts)}"
+    more = ", ".join(
+        f"{_WHO[name]} {'removes ' if worse else ''}{_shares(name, both)}" for name in rest
+    )
     sentence = (text[0].upper() + text[1:] + (f"; {more}" if more else "")) + "."
     return f"{sentence} {_CAMERA_REMARK}" if alone else sentence
 
 
-def _shares(name: str, parts: Sequence[Mapping[str, Any]]) -> str:
-    shares = [100 * part["errors"][name]["removed"]["value"] for part in parts]
+def _shares(name: str, parts: Sequence[Mapping[str, Any]], sign: int = 1) -> str:
+    shares = [100 * sign * part["errors"][name]["removed"]["value"] for part in parts]
     return " and ".join(f"{share:.0f} %".replace("-", "−") for share in shares)
 
 

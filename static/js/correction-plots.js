@@ -137,7 +137,7 @@ export function ladderChart({ rungs, parts }) {
           element(
             "small",
             {},
-            `${one.kinds.map((kind) => KINDS[kind] ?? kind).join(", ")}; ${one.probes} pushes`,
+            `${one.kinds.map((kind) => KINDS[kind] ?? kind).join(", ")}; ${pushesText(one.probes)}`,
           ),
         ),
         rungs.map((rung) => ladderBar(rung, one, most)),
@@ -154,12 +154,20 @@ export function ladderChart({ rungs, parts }) {
 }
 
 /**
+ * Say how many pushes there are; intervals come from drawing them anew, of which one says nothing.
+ * @param {number} count
+ * @returns {string}
+ */
+const pushesText = (count) =>
+  count === 1 ? "1 push, so that no interval is known" : `${count} pushes`;
+
+/**
  * @param {Rung} rung
  * @param {LadderPart} part
  * @param {number} most end of the bars' scale
  * @returns {HTMLElement}
  */
-function ladderBar({ name, label, network }, { errors, noise_floor: floor }, most) {
+function ladderBar({ name, label, network }, { errors, probes, noise_floor: floor }, most) {
   const { error, low, high, removed } = errors[name];
   /**
    * @param {number} value
@@ -170,8 +178,9 @@ function ladderBar({ name, label, network }, { errors, noise_floor: floor }, mos
   const reduction =
     name === "baseline"
       ? ""
-      : `${formatPercent(removed.value)} ` +
-        `(${formatPercent(removed.low)} to ${formatPercent(removed.high)})`;
+      : `${formatPercent(removed.value)}${
+          probes === 1 ? "" : ` (${formatPercent(removed.low)} to ${formatPercent(removed.high)})`
+        }`;
   return element(
     "div",
     {

@@ -45,7 +45,7 @@ def coverage_picture(dataset: Dataset, phantom_from_robot: Transform, path: Path
     norm = Normalize(0.0, max(1.0, *(float(depth.max()) for depth in depths.values())))
     figure, axes = _figure(dataset)
     for view in _VIEWS:
-        _draw_box(axes[view], dataset, view)
+        _draw_phantom(axes[view], dataset, view)
         for name, points in paths.items():
             _draw_path(axes[view], 1e3 * points[:, _VIEWS[view]], depths[name], colours, norm)
     motions = [
@@ -151,23 +151,20 @@ def _draw_legend(axis: Axes, dataset: Dataset, colours: Colormap, norm: Normaliz
     )
 
 
-def _draw_box(axis: Axes, dataset: Dataset, view: str) -> None:
-    from matplotlib.patches import Rectangle
+def _draw_phantom(axis: Axes, dataset: Dataset, view: str) -> None:
+    """Draw the outline of the phantom at rest, and the landmarks that were touched."""
+    from matplotlib.collections import PolyCollection
 
-    size = 1e3 * np.array(dataset.config.size)
-    low = np.array([-size[0] / 2, -size[1] / 2, 0.0])
+    body = dataset.geometry
+    low, size = 1e3 * body.low, 1e3 * (body.high - body.low)
     across, up = _VIEWS[view]
-    axis.add_patch(
-        Rectangle(
-            (low[across], low[up]),
-            size[across],
-            size[up],
-            facecolor=_BOX,
-            edgecolor=_INK,
-            linewidth=1.2,
-            zorder=0,
-        )
-    )
+    vertices, triangles = body.closed_surface
+    drawn = list(1e3 * vertices[triangles][..., [across, up]])
+    # The lines of all triangles, of which the fill over them leaves the outline.
+    for colour, width, order in ((_INK, 2.4, -1.0), (_BOX, 0.5, 0.0)):
+        triangles_in_view = PolyCollection(drawn, facecolor=_BOX, edgecolor=colour)
+        triangles_in_view.set(linewidth=width, zorder=order, joinstyle="round")
+        axis.add_collection(triangles_in_view)
     landmarks = 1e3 * np.array([dataset.config.landmarks[name] for name in dataset.touches.names])
     axis.plot(
         landmarks[:, across],

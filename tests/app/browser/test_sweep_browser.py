@@ -126,8 +126,8 @@ def test_a_swept_place_is_of_a_lump_and_its_point_is_replayed(page: Any, home: P
     held = page.locator("input[aria-label^='Held: ']")
     assert held.count() == 4
     page.fill("input[aria-label='Held: stiff_inclusion.stiffness_ratio']", "9")
-    page.fill("input[name=steps]", "3")
-    page.fill("input[name=frames]", "2")
+    page.fill("input[name=steps]", "2")
+    page.fill("input[name=frames]", "1")
     page.click("text=Start the sweep")
     page.wait_for_selector("[data-direction='stiff_inclusion.x']", timeout=LONG)
     assert "stiffness ratio 9" in page.locator("#panel-sweep").inner_text()
@@ -143,7 +143,7 @@ def test_a_swept_place_is_of_a_lump_and_its_point_is_replayed(page: Any, home: P
     wait_for(lambda: page.client.get(f"/api/jobs/{jobs[0]['id']}").json()["state"] == "done", 240.0)
     model = json.loads((home / "runs" / jobs[0]["id"] / "model.json").read_text())
     lump = model["effects"][0]["parameters"]
-    assert lump["stiffness_ratio"] == 9.0 and lump["x"] in (-size[0] / 2, 0.0, size[0] / 2)
+    assert lump["stiffness_ratio"] == 9.0 and abs(lump["x"]) == size[0] / 2
 
 
 def test_a_long_one_is_stopped_and_its_points_are_there_after_a_reload(page: Any) -> None:

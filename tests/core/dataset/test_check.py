@@ -8,7 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.spatial.transform import Rotation
+from shape_run import liver
+from shapes import write_felt_shape
 from small_dataset import ply_bytes, small_cloud, write_valid_dataset
 
 from palpate.dataset import open_dataset
@@ -193,3 +196,19 @@ def test_a_picture_of_paths_that_never_touch_can_be_drawn(folder: Path, tmp_path
     raised = Transform(translation=np.array([0, 0, 0.02])) @ registration(folder)
     coverage_picture(open_dataset(folder), raised, tmp_path / "coverage.png")
     assert (tmp_path / "coverage.png").stat().st_size > 10_000
+
+
+def test_the_coverage_picture_of_a_shape_has_its_outline(tmp_path: Path) -> None:
+    folder = tmp_path / "liver"
+    folder.mkdir()
+    write_felt_shape(folder, liver().vertices, liver().triangles)
+    coverage_picture(open_dataset(folder), Transform(), tmp_path / "coverage.png")
+    picture = np.array(Image.open(tmp_path / "coverage.png").convert("RGB")).astype(int)
+    above = picture[: picture.shape[0] // 2, : picture.shape[1] // 2]
+    body = np.abs(above - [0xEE, 0xF0, 0xF2]).max(axis=2) < 3
+    # Smoothed edges of letters have some pixels of this colour.
+    rows, columns = (np.flatnonzero(body.sum(axis=axis) > 20) for axis in (1, 0))
+    filled = body[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    x, y, _ = liver().size
+    assert np.ptp(columns) / np.ptp(rows) == pytest.approx(x / y, rel=0.03)
+    assert 0.5 < filled.mean() < 0.9

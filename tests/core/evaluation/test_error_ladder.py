@@ -130,6 +130,16 @@ def test_sentence_has_both_shares_on_both_kinds():
     )
 
 
+def test_sentence_of_a_network_that_makes_it_worse_says_that_it_adds() -> None:
+    worse = _rung("baseline_network", _gaps(3e-3, 3e-3, 3e-3, 3e-3), network=True)
+    better = _rung("extended", _gaps(1e-3, 1e-3, 1e-3, 1e-3))
+    before = _rung("baseline", _gaps(2e-3, 2e-3, 2e-3, 2e-3))
+    text = summary_sentence(_ladder(before, worse, better))
+    added = text.removeprefix("The network alone adds ").split(" %")[0]
+    assert float(added) > 0 and "to the error that can be removed" in text
+    assert "naming the cause alone removes" in text
+
+
 def test_sentence_of_a_single_model_says_that_there_is_no_other():
     assert "no other model to compare yet" in summary_sentence(_ladder(THREE[0]))
 
