@@ -72,6 +72,11 @@ class DatasetWriter:
 
     def copied(self, file: str, source: Path) -> None:
         """Copy a file that the setup names."""
+        if Path(file).is_absolute() or ".." in Path(file).parts:
+            raise DatasetError(
+                f"{file} leads out of the dataset; expected a name inside it: move the file there",
+                file=file,
+            )
         place = self.folder / file
         place.parent.mkdir(parents=True, exist_ok=True)
         try:
