@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -107,6 +108,7 @@ class _Run:
         write_setup(self.writer, self.mapping, _PROVISIONAL, self.base)
         phantom = found_phantom(self.writer, timed, self.notes)
         windows = self.mapping.sequences or self._windows(timed, phantom)
+        _check_windows(windows, [one.name for one in recordings])
         splits = self.mapping.setup.get("splits") or self._splits(windows)
         write_setup(self.writer, self.mapping, splits, self.base)
         report(0.45, "digests of the sources")
@@ -233,6 +235,26 @@ def _from(mapping: ImportMapping, base: Path) -> ImportMapping:
         file = str((base / mapping.rest.file).resolve())
         changed["rest"] = mapping.rest.model_copy(update={"file": file})
     return mapping.model_copy(update=changed)
+
+
+def _check_windows(windows: Sequence[SequenceWindow], recordings: Sequence[str]) -> None:
+    """Refuse sequences of unknown recordings, and names that come twice."""
+    seen: set[str] = set()
+    for window in windows:
+        if window.recording not in recordings:
+            raise DatasetError(
+                f"sequence {window.name} is of recording '{window.recording}'; expected one of "
+                f"{', '.join(recordings)}: correct [[sequences]]",
+                key="sequences",
+                value=window.recording,
+            )
+        if window.name in seen:
+            raise DatasetError(
+                f"two sequences are named {window.name}; expected each name once: rename one",
+                key="sequences",
+                value=window.name,
+            )
+        seen.add(window.name)
 
 
 def _inside(times: Stamps, window: SequenceWindow) -> BoolArray:

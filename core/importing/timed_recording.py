@@ -82,7 +82,13 @@ def timed_recording(
         for role, track in tracks.items()
     }
     times = on_common_clock(tracks, times, "pose", notes)
-    return _timed(recording.name, tracks, times, mapping, notes)
+    timed = _timed(recording.name, tracks, times, mapping, notes)
+    if timed.uncertainty:
+        notes.decide(
+            f"{timed.name}: times of clouds and forces against the poses are uncertain by "
+            f"{1e3 * timed.uncertainty:.1f} ms"
+        )
+    return timed
 
 
 def _timed(

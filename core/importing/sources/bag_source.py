@@ -14,7 +14,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
-from palpate.importing.messages.message_kinds import KINDS, header_of, nested_transforms
+from palpate.importing.messages.message_kinds import (
+    KINDS,
+    header_of,
+    nested_transforms,
+    packed_numbers,
+)
 from palpate.importing.rules import ColumnRules
 from palpate.importing.sources.bag_readers import (
     BAG_SUFFIXES,
@@ -141,7 +146,10 @@ class BagSource:
         )
 
     def _value(self, connection: Any, raw: bytes, received: int) -> FloatArray:
+        kind = KINDS[connection.msgtype]
         try:
+            if kind.packed:
+                return packed_numbers(raw, self._is_ros2, kind.packed)
             message = self._message(connection.msgtype, raw)
         except BROKEN as error:
             raise DatasetError(
@@ -149,7 +157,7 @@ class BagSource:
                 f"is no {connection.msgtype} ({error}); expected a whole one",
                 file=self.path.name,
             ) from None
-        return KINDS[connection.msgtype].decode(message)
+        return kind.decode(message)
 
     def _message(self, kind: str, raw: bytes) -> Any:
         if self._is_ros2:

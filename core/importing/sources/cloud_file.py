@@ -16,6 +16,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.importing.messages.depth_messages import depth_from_png
 from palpate.importing.messages.pinhole_camera import PinholeCamera
+from palpate.importing.messages.point_cloud import unmeasured
 
 __all__ = ["CLOUD_SUFFIXES", "read_cloud_file"]
 
@@ -43,8 +44,7 @@ def read_cloud_file(path: Path) -> FloatArray:
             file=path.name,
         )
     points = points.astype(float)
-    with np.errstate(invalid="ignore"):
-        points[~np.isfinite(points).all(axis=-1) | (points == 0).all(axis=-1)] = np.nan
+    points[unmeasured(points)] = np.nan
     return points
 
 

@@ -19,9 +19,9 @@ from palpate.importing.sources.table_source import TableSource
 POINTS = np.random.default_rng(5).normal(size=(50, 3)) * 0.1
 
 
-def by_open3d(path: Path, **options: bool) -> None:
+def by_open3d(path: Path, write_ascii: bool = False, compressed: bool = False) -> None:
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(POINTS))
-    assert open3d.io.write_point_cloud(path, cloud, **options)
+    assert open3d.io.write_point_cloud(path, cloud, write_ascii=write_ascii, compressed=compressed)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from bench_recording import CORNERS, ROBOT_FROM_PHANTOM, BenchRecording, bench_setup
 
 from palpate.dataset import open_dataset
@@ -129,6 +130,45 @@ def test_cuts_outside_of_the_recording_are_refused(bag: Path, tmp_path: Path) ->
     with pytest.raises(DatasetError, match=r"mine: 0 poses lie from 1\.000 to 2\.000 s"):
         import_recordings(
             mapping.model_copy(update={"sequences": windows}), bag.parent, tmp_path / "made", notes
+        )
+
+
+@pytest.mark.parametrize(
+    ("names", "recording", "said"),
+    [
+        (("a", "b"), "other", "is of recording 'other'; expected one of bench"),
+        (("a", "a"), "bench", "two sequences are named a"),
+    ],
+)
+def test_cuts_that_contradict_themselves_are_refused(
+    bag: Path, tmp_path: Path, names: tuple[str, str], recording: str, said: str
+) -> None:
+    mapping, notes = proposal(bag)
+    windows = tuple(
+        SequenceWindow(name=name, recording=recording, start=1.0, end=2.0) for name in names
+    )
+    with pytest.raises(DatasetError, match=said):
+        import_recordings(
+            mapping.model_copy(update={"sequences": windows}), bag.parent, tmp_path / "made", notes
+        )
+
+
+def test_a_phantom_of_any_shape_is_copied_with_its_surface(bag: Path, tmp_path: Path) -> None:
+    surface = trimesh.creation.box((0.0687, 0.0393, 0.0358))
+    surface.apply_translation([0, 0, 0.0179])
+    surface.export(bag.parent / "phantom.stl")
+    mapping, notes = proposal(bag)
+    phantom = {"geometry": "mesh", "surface": "phantom.stl", "mass": 0.104, "fixed": "base"}
+    setup = {**mapping.setup, "phantom": phantom}
+    import_recordings(
+        mapping.model_copy(update={"setup": setup}), bag.parent, tmp_path / "made", notes
+    )
+    assert (tmp_path / "made" / "phantom.stl").is_file()
+    assert "poke-top-02" in open_dataset(tmp_path / "made").sequences
+    outside = {**setup, "phantom": {**phantom, "surface": "../phantom.stl"}}
+    with pytest.raises(DatasetError, match="leads out of the dataset"):
+        import_recordings(
+            mapping.model_copy(update={"setup": outside}), bag.parent, tmp_path / "two", notes
         )
 
 

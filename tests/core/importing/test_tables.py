@@ -27,7 +27,6 @@ HEADER = "t,x,y,z,qx,qy,qz,qw"
 
 def rows(unit: float = 1.0, times: list[str] | None = None) -> list[list[str]]:
     stamps = times or [f"{t // 10**9}.{t % 10**9:09d}" for t in TIMES.tolist()]
-    scaled = POSES * [unit] * 1
     scaled = np.concatenate([POSES[:, :3] * unit, POSES[:, 3:]], axis=1)
     return [[stamp, *(f"{v:.9f}" for v in row)] for stamp, row in zip(stamps, scaled, strict=True)]
 
@@ -56,7 +55,7 @@ def german(row: list[str]) -> list[str]:
     return [cell.replace(".", ",") for cell in row]
 
 
-DIALECTS = {
+DIALECTS: dict[str, str | bytes] = {
     "plain": text(HEADER, rows()),
     "windows": text(HEADER, rows(), end="\r\n"),
     "byte order mark": b"\xef\xbb\xbf" + text(HEADER, rows()).encode(),
