@@ -49,7 +49,9 @@ def off_surface(config: DatasetConfig, body: Geometry) -> list[str]:
     for words, other in _others(places, body) if len(names) > 2 else ():
         left = float(np.abs(body.facing(other)[0]).max())
         if left < bound:
-            return [f"{told}, and all within {1e3 * left:.2g} mm if they are {words}: correct them"]
+            return [
+                f"{told}, and all within {max(1e3 * left, 0.01):.2g} mm if they are {words}: correct them"
+            ]
     return [f"{told}: are they in the phantom's frame, in metres, and of this surface?"]
 
 
@@ -70,11 +72,11 @@ def _others(places: FloatArray, body: Geometry) -> Iterator[tuple[str, FloatArra
     yield "read as x, z, y", places[:, [0, 2, 1]]
     for scale in _SCALES:
         yield f"multiplied by {scale:g}, as of another unit", scale * places
+    shift = _best_shift(places, body)
+    shown = ", ".join(f"{1e3 * value:+.1f}" for value in shift + 0.0)
+    yield f"moved by ({shown}) mm along x, y, z", places + shift
     scale = _best_scale(places, body)
     yield f"multiplied by {scale:.3f}", scale * places
-    shift = _best_shift(places, body)
-    shown = ", ".join(f"{1e3 * value:+.1f}" for value in shift)
-    yield f"moved by ({shown}) mm along x, y, z", places + shift
 
 
 def _best_scale(places: FloatArray, body: Geometry) -> float:

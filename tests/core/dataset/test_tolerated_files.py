@@ -36,9 +36,7 @@ def test_backslashes_in_the_list_of_clouds_are_read(folder: Path) -> None:
 
 def test_a_comment_of_a_cloud_may_hold_any_characters(folder: Path) -> None:
     header = b"ply\ncomment von J\xfcrgen\n"
-    (folder / "rest.ply").write_bytes(
-        ply_bytes(small_cloud()).replace(b"ply\n", header, 1)
-    )
+    (folder / "rest.ply").write_bytes(ply_bytes(small_cloud()).replace(b"ply\n", header, 1))
     assert len(open_dataset(folder).rest_cloud()) == 192
 
 
