@@ -61,7 +61,7 @@ def test_stamps_with_too_few_digits_are_named_as_such(folder: Path) -> None:
     header, *rows = path.read_text().split()
     short = [f"{1.6e9 + float(row.split(',')[0]):g},{row.split(',', 1)[1]}" for row in rows]
     path.write_text("\n".join([header, *short]) + "\n")
-    with pytest.raises(DatasetError, match="199 of 200 stamps repeat .* too few digits"):
+    with pytest.raises(DatasetError, match=r"199 of 200 stamps repeat .* too few digits"):
         open_dataset(folder)
 
 
