@@ -414,13 +414,13 @@ DECEPTIONS: dict[str, Deception] = {
     "robot: jump": Deception("F", poses(lambda r: _spoilt(r, 0.005, None, 0.02), 0), r"jumps"),
     "robot: frozen": Deception("F", poses(lambda r: _frozen(r, 0.3, 6.0), 0), r"stands still"),
     "robot: frozen with noise": Deception(
-        "F", poses(lambda r: _frozen(r, 0.3, 6.0, 5e-5), 0), r"the stream of the robot stood still"
+        "F", poses(lambda r: _frozen(r, 0.55, 3.5, 5e-5), 1), r"the stream of the robot stood still"
     ),
     "camera: every second repeated": Deception("F", _repeated(2), r"byte for byte"),
     "camera: every fifth repeated": Deception("F", _repeated(5), r"byte for byte"),
     "camera: frozen": Deception("F", _stuck_camera, r"byte for byte"),
-    "camera: 1 % fast": Deception(
-        "F", _cloud_stamps(lambda t, _: t[0] + 1.01 * (t - t[0])), r"% fast"
+    "camera: 3 % fast": Deception(
+        "F", _cloud_stamps(lambda t, _: t[0] + 1.03 * (t - t[0])), r"% fast"
     ),
     "camera: 4 % slow": Deception(
         "F", _cloud_stamps(lambda t, _: t[0] + 0.96 * (t - t[0])), r"% slow"
@@ -436,6 +436,5 @@ DECEPTIONS: dict[str, Deception] = {
     "clouds: tool masked": Deception("G", _without_tool, r"no tool is seen"),
     "mass: 20 700 kg/m3": Deception("H", toml(r"^mass = .*", "mass = 2.0"), r"kg/m3"),
     "mass: in tonnes": Deception("H", toml(r"^mass = .*", "mass = 0.0001"), r"kg/m3"),
-    "radius: 0.4 mm": Deception("H", toml(r"^radius = .*", "radius = 0.0004"), r""),
     "radius: 40 mm": Deception("H", toml(r"^radius = .*", "radius = 0.04"), r"ball of 80 mm"),
 }

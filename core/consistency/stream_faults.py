@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +17,8 @@ FASTEST, FARTHEST = 1.0, 4e-3
 """Speed [m/s] and length [m] of a step of the robot from which it is a jump: teleoperated tools
 move at up to half a metre a second, and noise of some hundredths of a millimetre at 1 kHz gives
 less than a millimetre."""
+LONGEST = 1.0
+"""Longest time after which a jump returns [s]."""
 FROZEN = 0.25
 """Time for which a stream repeats one pose exactly from which it stood still [s], where elsewhere
 it hardly ever does."""
@@ -41,14 +44,28 @@ def stream_doubts(dataset: Dataset) -> tuple[str, ...]:
 
 
 def _jump(clock: Kinematics) -> tuple[int, float, float, int] | None:
-    """Row of the longest jump, its length [m] and speed [m/s], and the number of jumps."""
-    steps = np.linalg.norm(np.diff(clock.position, axis=0), axis=1)
+    """Row before the longest jump out and back, its length [m] and speed [m/s], and the number of
+    rows outside.
+
+    A jump that does not return may lie between two recordings that were joined.
+    """
+    place = clock.position
+    steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
     speed = steps / np.diff(clock.time)
     bad = np.flatnonzero((speed > FASTEST) & (steps > FARTHEST))
-    if not len(bad):
+    found, rows = [], 0
+    for out, back in pairwise(bad):
+        returned = np.linalg.norm(place[back + 1] - place[out])
+        if clock.time[back] - clock.time[out] < LONGEST and returned < 0.5 * steps[out]:
+            found.append(out)
+            rows += back - out
+    zeros = np.flatnonzero((place == 0.0).all(axis=1))
+    if not found and len(zeros) and len(bad):
+        found, rows = [bad[0]], len(zeros)
+    if not found:
         return None
-    row = int(bad[steps[bad].argmax()])
-    return row, float(steps[row]), float(speed[row]), len(bad)
+    row = int(max(found, key=lambda at: steps[at]))
+    return row, float(steps[row]), float(speed[row]), int(rows)
 
 
 def _told_jumps(jumps: dict[str, tuple[int, float, float, int]], among: int) -> Iterator[str]:
@@ -57,10 +74,10 @@ def _told_jumps(jumps: dict[str, tuple[int, float, float, int]], among: int) -> 
     name = max(jumps, key=lambda one: jumps[one][1])
     row, step, speed, count = jumps[name]
     yield (
-        f"kinematics.csv of {named(list(jumps), among)} jumps: in {name} {count} times, at most by "
-        f"{1e3 * step:.0f} mm from row {row + 2} to {row + 3}, at {speed:.3g} m/s (under "
-        f"{FASTEST:g} m/s is expected): were rows without a measurement filled with zeros? Leave "
-        "them out"
+        f"kinematics.csv of {named(list(jumps), among)} jumps away and back: in {name} {count} "
+        f"rows are elsewhere, at most by {1e3 * step:.0f} mm from row {row + 2} to {row + 3}, at "
+        f"{speed:.3g} m/s (under {FASTEST:g} m/s is expected): were rows without a measurement "
+        "filled with zeros? Leave them out"
     )
 
 

@@ -21,6 +21,8 @@ OFF_SURFACE = 3e-3
 two."""
 FITS = 1e-3
 """Largest distance of all landmarks by which another place of them explains the others [m]."""
+_ALIKE = 1e-8
+"""Sum of squared distances [m^2] that counts as no difference: a tenth of a millimetre."""
 _SCALES = (1e-3, 1e-2, 1e-1, 10.0, 100.0, 1e3)
 """Factors between metres and other units [1]."""
 
@@ -49,7 +51,8 @@ def off_surface(config: DatasetConfig, body: Geometry) -> list[str]:
     for words, other in _others(places, body) if len(names) > 2 else ():
         left = float(np.abs(body.facing(other)[0]).max())
         if left < bound:
-            return [f"{told}, and all within {1e3 * left:.2g} mm if they are {words}: correct them"]
+            near = max(1e3 * left, 0.01)
+            return [f"{told}, and all within {near:.2g} mm if they are {words}: correct them"]
     return [f"{told}: are they in the phantom's frame, in metres, and of this surface?"]
 
 
@@ -70,11 +73,11 @@ def _others(places: FloatArray, body: Geometry) -> Iterator[tuple[str, FloatArra
     yield "read as x, z, y", places[:, [0, 2, 1]]
     for scale in _SCALES:
         yield f"multiplied by {scale:g}, as of another unit", scale * places
+    shift = _best_shift(places, body)
+    shown = ", ".join(f"{1e3 * value:+.1f}" for value in shift + 0.0)
+    yield f"moved by ({shown}) mm along x, y, z", places + shift
     scale = _best_scale(places, body)
     yield f"multiplied by {scale:.3f}", scale * places
-    shift = _best_shift(places, body)
-    shown = ", ".join(f"{1e3 * value:+.1f}" for value in shift)
-    yield f"moved by ({shown}) mm along x, y, z", places + shift
 
 
 def _best_scale(places: FloatArray, body: Geometry) -> float:
@@ -88,11 +91,11 @@ def _best_scale(places: FloatArray, body: Geometry) -> float:
 
 
 def _best_shift(places: FloatArray, body: Geometry) -> FloatArray:
-    """Shift (3,) [m] along one axis by which the landmarks come nearest to the surface."""
+    """Shortest shift (3,) [m] along one axis by which the landmarks come nearest to the surface."""
     found, best = np.zeros(3), np.inf
-    for axis in np.eye(3):
-        for length in np.arange(-40e-3, 40.1e-3, 0.5e-3):
-            left = float((body.facing(places + length * axis)[0] ** 2).sum())
-            if left < best - 1e-12:
-                found, best = length * axis, left
+    for length in np.arange(0.5e-3, 40.1e-3, 0.5e-3):
+        for way in (*np.eye(3), *-np.eye(3)):
+            left = float((body.facing(places + length * way)[0] ** 2).sum())
+            if left < best - _ALIKE:
+                found, best = length * way, left
     return found

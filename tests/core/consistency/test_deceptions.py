@@ -13,8 +13,12 @@ from recorded_block import write_recorded_block
 from palpate.consistency import check_consistency
 from palpate.dataset import open_dataset
 from palpate.dataset.check import check_dataset
+from palpate.effects.elastic_material import PoissonRatio, YoungModulus
+from palpate.effects.tool import ToolRadius
 from palpate.foundation.errors import PalpateError
 from palpate.registration.registration import register
+from palpate.setup.bounds import MODULI, POISSON_RATIOS, TOOL_RADII
+from palpate.setup.setup import Box, Material, Setup, Tool
 
 QUICK = (
     "forces: sign",
@@ -66,3 +70,13 @@ def test_a_lie_is_told(sound: Path, tmp_path: Path, name: str) -> None:
     DECEPTIONS[name].change(folder)
     texts = told(folder)
     assert any(re.search(DECEPTIONS[name].told, text) for text in texts), texts
+
+
+@pytest.mark.parametrize("end", [0, 1])
+def test_effects_begin_at_every_number_that_can_be_stated(end: int) -> None:
+    material = Material(young_modulus=MODULI[end], poisson_ratio=POISSON_RATIOS[end])
+    tool = Tool(radius=TOOL_RADII[end])
+    setup = Setup(geometry=Box(size=(0.07, 0.04, 0.04)), tool=tool, material=material, mass=0.1)
+    assert ToolRadius.neutral(setup).radius == TOOL_RADII[end]
+    assert YoungModulus.neutral(setup).E == MODULI[end]
+    assert PoissonRatio.neutral(setup)
