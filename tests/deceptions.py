@@ -422,9 +422,6 @@ DECEPTIONS: dict[str, Deception] = {
     "camera: 3 % fast": Deception(
         "F", _cloud_stamps(lambda t, _: t[0] + 1.03 * (t - t[0])), r"% fast"
     ),
-    "camera: 4 % slow": Deception(
-        "F", _cloud_stamps(lambda t, _: t[0] + 0.96 * (t - t[0])), r"% slow"
-    ),
     "camera: an offset each": Deception(
         "F",
         _cloud_stamps(lambda t, n: t + (0.0, 0.8, -0.6, 0.3)[n % 4]),

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from palpate.consistency.contact_timeline import ContactTimeline
 from palpate.dataset import Dataset, Sequence
 from palpate.dataset.tool_smoothing import averaged
-from palpate.foundation.arrays import FloatArray
+from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.frames import Transform
 
 __all__ = ["FeltMotion", "Reading", "readings"]
@@ -76,7 +76,7 @@ class FeltMotion:
         return float(np.isfinite(self.force[pressed, 0]).mean()) if pressed.any() else 1.0
 
     @property
-    def pressed(self) -> FloatArray:
+    def pressed(self) -> IntArray:
         """Rows in contact whose force is known."""
         return np.flatnonzero(
             (self.timeline.depth > _PRESSED) & np.isfinite(self.force).all(axis=1)
@@ -134,7 +134,7 @@ class FeltMotion:
         rows = self.pressed
         push = self.timeline.depth[rows] ** 1.5
         slope = float(np.linalg.norm(self.force[rows], axis=1) @ push / max(push @ push, 1e-30))
-        return 0.75 * slope * (1 - poisson_ratio**2) / np.sqrt(radius)
+        return float(0.75 * slope * (1 - poisson_ratio**2) / np.sqrt(radius))
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,9 +74,8 @@ class SeenTool:
         """
         middle = 0.5 * (self.clock[0] + self.clock[-1])
         at = self.time - late - rate * (self.time - middle)
-        return self.end - np.stack(
-            [np.interp(at, self.clock, column) for column in self.expected.T], axis=-1
-        )
+        columns = [np.interp(at, self.clock, column) for column in self.expected.T]
+        return np.asarray(self.end - np.stack(columns, axis=-1))
 
     @property
     def spread(self) -> float:

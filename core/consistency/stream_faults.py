@@ -32,9 +32,9 @@ _TAIL = 4096
 def stream_doubts(dataset: Dataset) -> tuple[str, ...]:
     """Sentences about impossible streams of all sequences."""
     names = dataset.sequences
-    jumps = {n: found for n in names if (found := _jump(dataset.sequence(n).kinematics))}
-    still = {n: found for n in names if (found := _frozen(dataset.sequence(n).kinematics))}
-    same = {n: found for n in names if (found := _repeats(dataset, dataset.sequence(n)))}
+    jumps = {n: jump for n in names if (jump := _jump(dataset.sequence(n).kinematics))}
+    still = {n: stop for n in names if (stop := _frozen(dataset.sequence(n).kinematics))}
+    same = {n: again for n in names if (again := _repeats(dataset, dataset.sequence(n)))}
     return (
         *_told_jumps(jumps, len(names)),
         *_told_frozen(still, len(names)),
@@ -53,15 +53,16 @@ def _jump(clock: Kinematics) -> tuple[int, float, float, int] | None:
     steps = np.linalg.norm(np.diff(place, axis=0), axis=1)
     speed = steps / np.diff(clock.time)
     bad = np.flatnonzero((speed > FASTEST) & (steps > FARTHEST))
-    found, rows = [], 0
+    found: list[int] = []
+    rows = 0
     for out, back in pairwise(bad):
         returned = np.linalg.norm(place[back + 1] - place[out])
         if clock.time[back] - clock.time[out] < LONGEST and returned < 0.5 * steps[out]:
-            found.append(out)
-            rows += back - out
+            found.append(int(out))
+            rows += int(back - out)
     zeros = np.flatnonzero((place == 0.0).all(axis=1))
     if not found and len(zeros) and len(bad):
-        found, rows = [bad[0]], len(zeros)
+        found, rows = [int(bad[0])], len(zeros)
     if not found:
         return None
     row = int(max(found, key=lambda at: steps[at]))

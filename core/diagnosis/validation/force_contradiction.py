@@ -71,6 +71,6 @@ def _forces(model: Model) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _known(
     forces: ForceComparison, failed: tuple[int, ...]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    known = np.isfinite(forces.gap).all(axis=1) & np.isfinite(forces.force).all(axis=1)
+    known = np.asarray(np.isfinite(forces.gap + forces.force).all(axis=1))
     known[list(failed)] = False
     return (forces.gap + forces.force)[known], forces.force[known], forces.noise[known]
