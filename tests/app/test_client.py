@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -55,3 +57,22 @@ def test_what_fails_says_why_in_the_words_of_the_service(palpate: Client) -> Non
     with pytest.raises(ApiError, match="there is no dataset nothing") as refused:
         palpate.diagnose("nothing")
     assert refused.value.status == 404
+
+
+def test_a_question_whose_connection_broke_is_asked_again() -> None:
+    body = b'{"folder": "", "datasets": ["one"]}'
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def answer_the_second() -> None:
+            for reply in (b"", b"HTTP/1.1 200 OK\r\ncontent-length: %d\r\n\r\n" % len(body) + body):
+                connection, _ = listener.accept()
+                with connection:
+                    connection.recv(4096)
+                    connection.sendall(reply)
+
+        server = threading.Thread(target=answer_the_second, daemon=True)
+        server.start()
+        with Client(f"http://127.0.0.1:{listener.getsockname()[1]}") as client:
+            assert client.datasets() == ["one"]
+        server.join(timeout=60)
+        assert not server.is_alive()
