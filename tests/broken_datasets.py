@@ -103,7 +103,7 @@ _FOLDER = {
     "a bag": Breakage(
         write("sequences/poke-02.bag", b"#ROSBAG"),
         {"file": "sequences/poke-02.bag"},
-        ("not read yet", "export"),
+        ("not read in place", "palpate import"),
     ),
     "neither clouds nor forces": Breakage(
         _without_measurements, {"file": _POKE}, ("neither", "expected at least one")
