@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from palpate.fem import contact_condensation as compliance
-from palpate.fem import model
+from palpate.fem import contact_patch, model
 from palpate.fem.constitutive.elastic import Law, lame
 from palpate.fem.newton import Outcome
 from palpate.foundation.arrays import FloatArray
@@ -84,7 +83,7 @@ def test_fast_push_has_the_instantaneous_modulus_and_slow_push_the_relaxed_one(g
     slow = replay(
         _relaxing(), np.concatenate([_way(-6e-3), way]), grid, times=1e6 * np.arange(len(way) + 1)
     )
-    for module in (model, compliance):  # the penalty of the contact does not relax
+    for module in (model, contact_patch):  # the penalty of the contact does not relax
         stiffness = (
             module.CONTACT_STIFFNESS * SETUP.material.young_modulus / relaxed.material.young_modulus
         )
