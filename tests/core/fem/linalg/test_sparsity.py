@@ -83,7 +83,8 @@ def test_condensed_matrix_is_the_schur_complement_and_solves_with_any_values(sol
             made = factor.condense(scale * upper.data, kept)
             assert np.allclose(made.matrix, scale * wanted, atol=1e-12)
             reduced, partial = made.eliminate(right)
-            for values in (np.linalg.solve(made.matrix, reduced), np.cos(kept)):
+            balanced = np.asarray(np.linalg.solve(made.matrix, reduced), dtype=float)
+            for values in (balanced, np.cos(np.asarray(kept, dtype=float))):
                 found = made.substitute(partial, values)
                 assert np.allclose(found[kept], values, atol=1e-12)
                 assert np.allclose((scale * whole @ found)[left_out], right[left_out], atol=1e-11)
