@@ -99,7 +99,7 @@ def _norm_along(axis: int) -> Change:
 
 def _constant(value: float, noise: float = 0.0) -> Change:
     random = np.random.default_rng(0)
-    return columns(lambda force: value + noise * random.normal(size=force.shape))
+    return columns(lambda force: np.asarray(value + noise * random.normal(size=force.shape)))
 
 
 def _in_tool_frame(folder: Path) -> None:

@@ -7,6 +7,7 @@ clouds show block, table, ball and shaft from one camera. The truth stands besid
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -107,13 +108,15 @@ def _seen(points: FloatArray, pose: Transform, random: np.random.Generator) -> F
 
 def _sequence(
     home: Path,
-    pushes: list[tuple[tuple[float, ...], FloatArray, float]],
+    pushes: Sequence[tuple[tuple[float, ...], FloatArray, float]],
     start: float,
     pose: Transform,
     random: np.random.Generator,
 ) -> None:
     """Pushes one after the other, six seconds each and of uneven speed."""
-    time, centres, forces = [], [], []
+    time: list[FloatArray] = []
+    centres: list[FloatArray] = []
+    forces: list[FloatArray] = []
     axis = pushes[0][1]
     for number, (place, normal, depth) in enumerate(pushes):
         t = np.arange(0.0, 6.0 + number, 1 / RATE)

@@ -25,7 +25,7 @@ class SolvedCondensation:
         unit[unknowns, np.arange(len(unknowns))] = 1.0
         self._responses = factor.approximate(unit)
         inverse = self._responses[unknowns]
-        self.matrix: FloatArray = np.linalg.inv((inverse + inverse.T) / 2)
+        self.matrix = np.asarray(np.linalg.inv((inverse + inverse.T) / 2), dtype=float)
 
     @property
     def stored(self) -> bool:
