@@ -40,12 +40,12 @@ class Outcome(Enum):
         "the motion between frames is too large or the load too high"
     )
     INDEFINITE = (
-        "the stiffness stayed indefinite: the block buckles or an element is almost inverted"
+        "the stiffness stayed indefinite: the body buckles or an element is almost inverted"
     )
     INVERTED = "an element is inverted at the start of the solve"
     TOOL_SWINGS = (
         "the tool's mount is so compliant that no place was found "
-        "where its spring balances the block"
+        "where its spring balances the body"
     )
     BASE_SLIDES = "the base keeps sliding and finds no place where friction holds it"
     GRIP_SWINGS = (
