@@ -11,7 +11,14 @@ import pytest
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-LONGEST = ("tests/loop", "tests/examples", "tests/core/blind", "tests/core/diagnosis", "tests/app")
+LONGEST = (
+    "tests/loop",
+    "tests/examples",
+    "tests/core/synthetic/test_shape_dataset.py",
+    "tests/core/blind",
+    "tests/core/diagnosis",
+    "tests/app",
+)
 """These begin first, so that no worker ends with one of them while the others have nothing left."""
 
 SECOND_TIER = (
