@@ -98,8 +98,8 @@ def differences(
 ) -> Iterator[str]:
     """Yield where an answer lacks or changes something of the old one.
 
-    More keys are no difference, nor effects and targets that version 0.1 did not know. Strings with
-    blanks are prose, which may be worded anew.
+    More keys are no difference, nor effects and targets that version 0.1 did not know, nor further
+    warnings about the same data. Strings with blanks are prose, which may be worded anew.
 
     Args:
         old: what version 0.1 answered.
@@ -123,7 +123,7 @@ def differences(
         if name is not None:
             known = {item[name] for item in old}
             new = [item for item in new if item[name] in known]
-        if len(old) != len(new):
+        if len(new) < len(old) or (len(new) > len(old) and not place.endswith(".warnings")):
             yield f"{place}: {len(old)} items before, {len(new)} now"
         for number, (one, other) in enumerate(zip(old, new, strict=False)):
             yield from differences(one, other, f"{place}[{number}]", **more)
