@@ -115,37 +115,6 @@ def test_two_parameters_are_a_map_and_a_flat_one_is_called_flat(page: Any) -> No
     assert "flat" in page.locator("[data-direction='young_modulus.E']").inner_text()
 
 
-def test_a_swept_place_is_of_a_lump_and_its_point_is_replayed(page: Any, home: Path) -> None:
-    page.locator("select[aria-label=Parameter]").select_option("stiff_inclusion.x")
-    ends = [
-        float(page.input_value(f"input[aria-label='{end} of stiff_inclusion.x']"))
-        for end in ("from", "to")
-    ]
-    size = page.client.get("/api/datasets/phantom").json()["size"]
-    assert ends == pytest.approx([-size[0] * 500, size[0] * 500], rel=1e-3)
-    held = page.locator("input[aria-label^='Held: ']")
-    assert held.count() == 4
-    page.fill("input[aria-label='Held: stiff_inclusion.stiffness_ratio']", "9")
-    page.fill("input[name=steps]", "2")
-    page.fill("input[name=frames]", "1")
-    page.click("text=Start the sweep")
-    page.wait_for_selector("[data-direction='stiff_inclusion.x']", timeout=LONG)
-    assert "stiffness ratio 9" in page.locator("#panel-sweep").inner_text()
-    assert "Stiff inclusion: x:" in page.locator("[data-direction]").inner_text()
-    point = page.locator("#panel-sweep circle[data-point]").first
-    number = point.get_attribute("data-point")
-    point.click()
-    page.wait_for_selector(f"[data-chosen='{number}']")
-    page.click("text=Replay this point")
-    page.wait_for_selector("#panel-jobs:not([hidden])")
-    jobs = page.client.get("/api/jobs").json()
-    assert jobs[0]["kind"] == "replay"
-    wait_for(lambda: page.client.get(f"/api/jobs/{jobs[0]['id']}").json()["state"] == "done", 600.0)
-    model = json.loads((home / "runs" / jobs[0]["id"] / "model.json").read_text())
-    lump = model["effects"][0]["parameters"]
-    assert lump["stiffness_ratio"] == 9.0 and abs(lump["x"]) == size[0] / 2
-
-
 def test_a_long_one_is_stopped_and_its_points_are_there_after_a_reload(page: Any) -> None:
     begin_random(page, 400)
     page.click("#panel-sweep >> text=Stop")
@@ -220,3 +189,34 @@ def test_what_loads_late_does_not_take_the_front(page: Any) -> None:
     page.wait_for_selector("#panel .empty-panel", state="attached")
     page.wait_for_selector("#panel-sweep >> text=Start the sweep", state="visible")
     assert page.get_attribute("#tab-sweep", "aria-selected") == "true"
+
+
+def test_a_swept_place_is_of_a_lump_and_its_point_is_replayed(page: Any, home: Path) -> None:
+    page.locator("select[aria-label=Parameter]").select_option("stiff_inclusion.x")
+    ends = [
+        float(page.input_value(f"input[aria-label='{end} of stiff_inclusion.x']"))
+        for end in ("from", "to")
+    ]
+    size = page.client.get("/api/datasets/phantom").json()["size"]
+    assert ends == pytest.approx([-size[0] * 500, size[0] * 500], rel=1e-3)
+    held = page.locator("input[aria-label^='Held: ']")
+    assert held.count() == 4
+    page.fill("input[aria-label='Held: stiff_inclusion.stiffness_ratio']", "9")
+    page.fill("input[name=steps]", "2")
+    page.fill("input[name=frames]", "1")
+    page.click("text=Start the sweep")
+    page.wait_for_selector("[data-direction='stiff_inclusion.x']", timeout=LONG)
+    assert "stiffness ratio 9" in page.locator("#panel-sweep").inner_text()
+    assert "Stiff inclusion: x:" in page.locator("[data-direction]").inner_text()
+    point = page.locator("#panel-sweep circle[data-point]").first
+    number = point.get_attribute("data-point")
+    point.click()
+    page.wait_for_selector(f"[data-chosen='{number}']")
+    page.click("text=Replay this point")
+    page.wait_for_selector("#panel-jobs:not([hidden])")
+    jobs = page.client.get("/api/jobs").json()
+    assert jobs[0]["kind"] == "replay"
+    wait_for(lambda: page.client.get(f"/api/jobs/{jobs[0]['id']}").json()["state"] == "done", 600.0)
+    model = json.loads((home / "runs" / jobs[0]["id"] / "model.json").read_text())
+    lump = model["effects"][0]["parameters"]
+    assert lump["stiffness_ratio"] == 9.0 and abs(lump["x"]) == size[0] / 2
