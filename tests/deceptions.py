@@ -67,16 +67,21 @@ def truth(folder: Path) -> tuple[Transform, Transform]:
     return robot, Transform.from_matrix(stated["phantom_from_camera"])
 
 
-def forces(change: Callable[[Table], Table], which: int | None = None) -> Change:
-    """Change the rows t, fx, fy, fz of all forces, or of the sequence of this number."""
+def _table(file: str, change: Callable[[Table], Table], which: int | None) -> Change:
+    """Change the rows of a table of all sequences, or of the sequence of this number."""
 
     def apply(folder: Path) -> None:
         for number, home in enumerate(homes(folder)):
             if which is None or number == which:
-                header, rows = read_table(home / "forces.csv")
-                write_table(home / "forces.csv", header, change(rows))
+                header, rows = read_table(home / file)
+                write_table(home / file, header, change(rows))
 
     return apply
+
+
+def forces(change: Callable[[Table], Table], which: int | None = None) -> Change:
+    """Change the rows t, fx, fy, fz of all forces, or of the sequence of this number."""
+    return _table("forces.csv", change, which)
 
 
 def columns(change: Callable[[Table], Table]) -> Change:
@@ -217,14 +222,7 @@ def toml(pattern: str, replacement: str) -> Change:
 
 def poses(change: Callable[[Table], Table], which: int | None = None) -> Change:
     """Change the rows of all kinematics, or of the sequence of this number."""
-
-    def apply(folder: Path) -> None:
-        for number, home in enumerate(homes(folder)):
-            if which is None or number == which:
-                header, rows = read_table(home / "kinematics.csv")
-                write_table(home / "kinematics.csv", header, change(rows))
-
-    return apply
+    return _table("kinematics.csv", change, which)
 
 
 def _spoilt(rows: Table, seconds: float, value: Table | None, shift: float = 0.0) -> Table:

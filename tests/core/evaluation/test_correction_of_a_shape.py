@@ -23,7 +23,7 @@ from palpate.evaluation.train_network import TrainingPlan, complete_samples, tra
 from palpate.recording.replay_run import replay_into
 
 pytestmark = pytest.mark.more
-TRAINED, STOPPING, TESTED = "poke-top-01", "poke-top-02", "poke-top-03"
+TRAINED, STOPPING, TESTED = ("poke-top-01", "poke-top-04"), "poke-top-02", "poke-top-03"
 PLAN = TrainingPlan(
     spec={
         "network": {"kind": "unet3d", "features": [8, 16]},
@@ -52,7 +52,7 @@ class Trained:
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     home = tmp_path_factory.mktemp("dome")
-    splits = {"train": (TRAINED,), "validation": (STOPPING,), "test": (TESTED,)}
+    splits = {"train": TRAINED, "validation": (STOPPING,), "test": (TESTED,)}
     dataset = write_pressed_dome(home / "dome", splits)
     training = home / "training"
     summary = train_network(dataset, PLAN, training, store=home / "samples", workers=1)
@@ -112,4 +112,4 @@ def test_corrected_surface_stands_beside_that_of_the_run(trained: Trained) -> No
     assert deep.sum() > 5
     moved = np.linalg.norm(shown["corrected"] - shown["raw"], axis=2).max(axis=1)
     assert (moved[deep] > 2e-4).all()
-    assert shown["distance_corrected"][deep].mean() < 0.9 * shown["distance_raw"][deep].mean()
+    assert shown["distance_corrected"][deep].mean() < 0.85 * shown["distance_raw"][deep].mean()

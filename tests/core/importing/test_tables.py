@@ -42,7 +42,7 @@ def poses(source: Source) -> tuple[np.ndarray, np.ndarray]:
     return np.array([one.stamped for one in samples]), np.array([one.value() for one in samples])
 
 
-def check(path: Path, content: str | bytes, rules: ColumnRules | None = None) -> TableSource:
+def assert_poses(path: Path, content: str | bytes, rules: ColumnRules | None = None) -> TableSource:
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     source = TableSource(path, rules)
     times, values = poses(source)
@@ -95,7 +95,7 @@ DIALECTS: dict[str, str | bytes] = {
 
 @pytest.mark.parametrize("dialect", list(DIALECTS))
 def test_poses_are_the_same_in_every_dialect(tmp_path: Path, dialect: str) -> None:
-    check(tmp_path / "poses.csv", DIALECTS[dialect])
+    assert_poses(tmp_path / "poses.csv", DIALECTS[dialect])
 
 
 def test_rostopic_echo_keeps_stamp_and_receipt_apart(tmp_path: Path) -> None:
@@ -108,14 +108,14 @@ def test_rostopic_echo_keeps_stamp_and_receipt_apart(tmp_path: Path) -> None:
         [str(t + 3_000_000), str(at), str(t), "ECM", *row[1:]]
         for at, (t, row) in enumerate(zip(TIMES.tolist(), rows(), strict=True))
     ]
-    source = check(tmp_path / "pose.csv", text(header, body))
+    source = assert_poses(tmp_path / "pose.csv", text(header, body))
     assert source.has_receipt
     first = next(source.samples({"pose.csv#pose"}))
     assert first.received - first.stamped == 3_000_000
 
 
 def test_units_that_were_told_by_size_are_said(tmp_path: Path) -> None:
-    source = check(tmp_path / "poses.csv", DIALECTS["millimetres unsaid"])
+    source = assert_poses(tmp_path / "poses.csv", DIALECTS["millimetres unsaid"])
     assert "taken as mm" in source.warnings[0]
     assert source.rules is not None and source.rules.length_unit == "mm"
 
@@ -137,7 +137,7 @@ def test_unknown_names_are_listed_and_a_mapping_reads_them(tmp_path: Path) -> No
         ("other", "table of a, b, c, d, e, f, g, h")
     ]
     columns = dict(zip(HEADER.split(","), "abcdefgh", strict=True))
-    check(path, path.read_bytes(), ColumnRules(columns=columns, length_unit="mm"))
+    assert_poses(path, path.read_bytes(), ColumnRules(columns=columns, length_unit="mm"))
 
 
 def test_a_word_among_numbers_is_named_with_its_row(tmp_path: Path) -> None:
