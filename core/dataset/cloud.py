@@ -102,6 +102,9 @@ def read_cloud(root: Path, file: str, within: str = "") -> FloatArray:
     largest number, 65.535 m where it counts millimetres in 16 bits.
     """
     points = read_points(root, file, within)
+    # Measured: a tenth of the time of the tests of each point, which find what is wrong.
+    if np.abs(points).max() <= LARGEST_COORDINATE:
+        return points
     far = np.isfinite(points).all(axis=1) & (np.abs(points) > LARGEST_COORDINATE).any(axis=1)
     if 0 < far.sum() <= _MOST_FAR * len(points):
         points = points[~far]
