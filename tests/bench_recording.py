@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from recorded_bags import BagKind, written_bag
+from PIL import Image
+from recorded_bags import BagKind, WrittenBag, written_bag
 from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, TOML
 
-__all__ = ["CORNERS", "ROBOT_FROM_PHANTOM", "BenchRecording", "bench_setup"]
+__all__ = ["CORNERS", "ROBOT_FROM_PHANTOM", "BenchRecording", "SeenAs", "bench_setup"]
 
+SeenAs = Literal["points", "32FC1", "16UC1", "compressed"]
+"""How the camera's views are recorded."""
+MATRIX = np.array([[100.0, 0.0, 15.0], [0.0, 100.0, 10.0], [0.0, 0.0, 1.0]])
+"""Intrinsics of the camera [pixels]."""
 RADIUS = 0.005
 START = 1_700_000_000 * 10**9
 _SIGNS = ((1, 1), (1, -1), (-1, -1), (-1, 1))
@@ -99,12 +106,15 @@ class BenchRecording:
         rng = np.random.default_rng(number)
         rows, columns = np.mgrid[:20, :30]
         depth = 0.4 + rng.normal(0, 0.001, rows.shape)
-        points = np.stack([(columns - 15) * 0.004, (rows - 10) * 0.004, depth], axis=-1)
+        across, down = (columns - MATRIX[0, 2]) / MATRIX[0, 0], (rows - MATRIX[1, 2]) / MATRIX[1, 1]
+        points = np.stack([across * depth, down * depth, depth], axis=-1)
         points[rng.random(rows.shape) < 0.1] = np.nan
         return points
 
-    def write(self, path: Path, kind: BagKind = "ros1", clouds: bool = True) -> Path:
-        """Write the recording as one bag; clouds at 5 Hz."""
+    def write(
+        self, path: Path, kind: BagKind = "ros1", clouds: bool = True, seen_as: SeenAs = "points"
+    ) -> Path:
+        """Write the recording as one bag; clouds, or depth images, at 5 Hz."""
         stamps, _, places, turns = self.motion()
         forces = self.sensed()
         every = round(self.rate / 5)
@@ -114,6 +124,23 @@ class BenchRecording:
                 bag.pose("/PSM1/measured_cp", stamp, stamp + 2_000_000, pose, "PSM1_base")
                 bag.wrench("/ati", stamp, stamp + 2_000_000, forces[at], "ati_link")
                 if clouds and at % every == 0:
-                    cloud = self.image(at)
-                    bag.cloud("/camera/points", stamp, stamp + 9_000_000, cloud, "camera")
+                    _write_view(bag, stamp, self.image(at), seen_as)
         return path
+
+
+def _write_view(bag: WrittenBag, stamp: int, points: np.ndarray, seen_as: SeenAs) -> None:
+    received = stamp + 9_000_000
+    if seen_as == "points":
+        bag.cloud("/camera/points", stamp, received, points, "camera")
+        return
+    depth = np.nan_to_num(points[..., 2])
+    levels = np.round(1000 * depth).astype(np.uint16)
+    bag.camera_info("/camera/camera_info", stamp, received, depth.shape, MATRIX, np.zeros(5))
+    if seen_as == "compressed":
+        stream = io.BytesIO()
+        Image.fromarray(levels).save(stream, format="PNG")
+        data = b"\0" * 12 + stream.getvalue()
+        bag.compressed("/camera/packed", stamp, received, data, "16UC1; compressedDepth png")
+        return
+    image = levels if seen_as == "16UC1" else depth.astype(np.float32)
+    bag.image("/camera/image", stamp, received, image, "camera")
