@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from palpate.foundation.arrays import BoolArray, FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
+from palpate.importing.clocks.clock_jumps import without_jumps
 from palpate.importing.clocks.common_clock import on_common_clock
 from palpate.importing.clocks.stream_times import StreamTimes, stream_times
 from palpate.importing.clocks.track import Stamps, Track
@@ -77,6 +78,8 @@ def timed_recording(
     roles = {"pose": streams.pose, "cloud": streams.cloud, "wrench": streams.wrench}
     tracks = {role: found[name] for role, name in roles.items() if name in found}
     _check_frame(recording, tracks["pose"], mapping)
+    if mapping.time.stamps == "header":
+        tracks = without_jumps(tracks, notes)
     times = {
         role: stream_times(track, notes, use_receipt=mapping.time.stamps == "receipt")
         for role, track in tracks.items()
