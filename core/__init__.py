@@ -24,10 +24,11 @@ if __name__ != "palpate":
 
 if TYPE_CHECKING:
     from palpate import effects
-    from palpate.dataset import Dataset, open_dataset
+    from palpate.dataset import Dataset
     from palpate.diagnosis import DiagnosisResult, diagnose
     from palpate.experiment import Experiment, ReplayedSequence, register
     from palpate.foundation.errors import PalpateError
+    from palpate.importing.opened_bags import open_dataset
     from palpate.recording.compare_replay import ReplayComparison, compare
     from palpate.setup.setup import Setup
 
@@ -56,7 +57,7 @@ _PLACES = {
     "Setup": "palpate.setup.setup",
     "compare": "palpate.recording.compare_replay",
     "diagnose": "palpate.diagnosis",
-    "open_dataset": "palpate.dataset",
+    "open_dataset": "palpate.importing.opened_bags",
     "register": "palpate.experiment",
 }
 """Module of each public name."""

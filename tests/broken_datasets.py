@@ -103,7 +103,7 @@ _FOLDER = {
     "a bag": Breakage(
         write("sequences/poke-02.bag", b"#ROSBAG"),
         {"file": "sequences/poke-02.bag"},
-        ("not read in place", "palpate import"),
+        ("[topics]", "palpate import"),
     ),
     "neither clouds nor forces": Breakage(
         _without_measurements, {"file": _POKE}, ("neither", "expected at least one")
@@ -246,7 +246,7 @@ _KEYS = {
     ),
     "nothing to train on": _key('["poke-01"]', "[]", "splits.train", "at least one"),
     "topics of a bag": _key(
-        "[splits]", "[topics]\npose = '/p'\n[splits]", "topics", "bags are not read in place"
+        "[splits]", "[topics]\npose = '/p'\n[splits]", "topics", "no sequence is a bag"
     ),
 }
 

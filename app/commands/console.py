@@ -24,7 +24,10 @@ from palpate.foundation.progress import Report
 from palpate.foundation.quantities import parameter_texts
 
 __all__ = [
+    "DatasetFolder",
+    "DatasetFolders",
     "RegistrationOption",
+    "as_tables",
     "errors",
     "out",
     "print_problem",
@@ -44,6 +47,38 @@ RegistrationOption = Annotated[
     ),
 ]
 """The option by which verbs take an accepted registration."""
+
+
+def as_tables(folder: Path) -> Path:
+    """The folder of a dataset, or that of its import where its sequences are bags."""
+    if not (folder / "sequences").is_dir():
+        return folder
+    from palpate.importing.import_notes import ImportNotes
+    from palpate.importing.opened_bags import folder_of_tables, has_bags
+
+    if not has_bags(folder):
+        return folder
+    notes = ImportNotes()
+    with progress(f"import the bags of {folder.name}") as report:
+        opened = folder_of_tables(folder, notes, report)
+    print_warnings(notes.warnings)
+    errors.print(f"bags of {escape(str(folder))}: opened as {escape(str(opened))}", style="dim")
+    return opened
+
+
+DatasetFolder = Annotated[
+    Path, typer.Argument(help="A dataset folder.", show_default=False, callback=as_tables)
+]
+"""The argument of verbs that read one dataset, with tables or with bags."""
+DatasetFolders = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Dataset folders.",
+        show_default=False,
+        callback=lambda folders: [as_tables(one) for one in folders],
+    ),
+]
+"""The argument of verbs that read several."""
 
 BETWEEN_LINES = 30.0
 """Least time between two lines of progress in a log [s]."""

@@ -15,13 +15,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from palpate.app.commands.console import (
+    DatasetFolder,
+    DatasetFolders,
     RegistrationOption,
     out,
     print_problem,
     print_warnings,
     progress,
 )
-from palpate.app.commands.mesh_report import print_mesh
+from palpate.app.commands.mesh_report import print_mesh, print_mesh_errors
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import DatasetError, PalpateError, RegistrationError
 from palpate.foundation.progress import part
@@ -36,13 +38,12 @@ if TYPE_CHECKING:
 
 __all__ = ["check", "register", "replay"]
 
-Folder = Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)]
 _NODES = (25, 9, 9)
 """Nodes whose motion is written where the mesh itself follows the tool."""
 
 
 def check(
-    datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
+    datasets: DatasetFolders,
     picture: Annotated[
         Path | None, typer.Option(help="Write a picture of the touched places (one dataset only).")
     ] = None,
@@ -71,7 +72,7 @@ def check(
         raise typer.Exit(2)
 
 
-def register(dataset: Folder) -> None:
+def register(dataset: DatasetFolder) -> None:
     """Register robot, camera and phantom, each with its uncertainty."""
     from palpate.dataset import open_dataset
     from palpate.registration.registration import register as relate
@@ -97,7 +98,7 @@ def register(dataset: Folder) -> None:
 
 
 def replay(
-    dataset: Folder,
+    dataset: DatasetFolder,
     sequence: Annotated[str, typer.Option(help="Name of the sequence.", show_default=False)],
     file: Annotated[
         Path,
@@ -151,7 +152,7 @@ def replay(
         f"{len(frames)} frames on {where}, {len(frames) - len(failed)} converged: {file}",
         highlight=False,
     )
-    _print_mesh_errors(frames, errors)
+    print_mesh_errors(frames, errors)
     for number in failed:
         frame = frames[number]
         out.print(
@@ -201,24 +202,6 @@ def _failed(frames: Sequence[Equilibrium]) -> list[int]:
     from palpate.fem.newton import Outcome
 
     return [number for number, frame in enumerate(frames) if frame.outcome != Outcome.CONVERGED]
-
-
-def _print_mesh_errors(frames: Sequence[Equilibrium], errors: Sequence[MeshErrorEstimate]) -> None:
-    from palpate.replay.mesh_convergence import hardest_frames
-
-    if errors:
-        worst = max(errors, key=lambda error: error.displacement)
-        size = f"{1e3 * worst.displacement:.2f} mm RMS ({worst.relative:.0%})"
-        out.print(
-            f"the grid's own error, by a finer one: {size} and {worst.force:.0%} of the force "
-            f"at frame {worst.frame}, the worst of {len(errors)} touches"
-        )
-    for number in sorted(set(hardest_frames(frames)) - {error.frame for error in errors}):
-        out.print(
-            f"[yellow]frame {number}[/] no equilibrium on the finer grid, "
-            "so its mesh error is unknown",
-            highlight=False,
-        )
 
 
 def _check_one(path: Path, picture: Path | None) -> None:

@@ -18,6 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from palpate.app.commands.console import (
+    DatasetFolders,
     RegistrationOption,
     out,
     print_warnings,
@@ -51,7 +52,7 @@ same value."""
 
 
 def diagnose(
-    datasets: Annotated[list[Path], typer.Argument(help="Dataset folders.", show_default=False)],
+    datasets: DatasetFolders,
     file: Annotated[
         Path | None, typer.Option("--out", help="The report (JSON); for several datasets a folder.")
     ] = None,

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from palpate.app.commands.console import out, progress, write_json
+from palpate.app.commands.console import as_tables, out, progress, write_json
 from palpate.app.commands.diagnosis import true_effects
 from palpate.foundation.quantities import quantity
 
@@ -25,7 +25,9 @@ def evaluate(
     dataset: Annotated[
         Path,
         typer.Argument(
-            help="A dataset folder; --paper makes it if it does not exist.", show_default=False
+            help="A dataset folder; --paper makes it if it does not exist.",
+            show_default=False,
+            callback=as_tables,
         ),
     ],
     run: Annotated[

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from palpate.app.commands.console import RegistrationOption, out, progress
+from palpate.app.commands.console import DatasetFolder, RegistrationOption, out, progress
 from palpate.foundation.errors import EffectError
 from palpate.foundation.quantities import quantity
 
@@ -16,7 +16,7 @@ __all__ = ["sweep"]
 
 
 def sweep(
-    dataset: Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)],
+    dataset: DatasetFolder,
     parameter: Annotated[
         list[str],
         typer.Option(

@@ -9,14 +9,14 @@ from typing import Annotated
 
 import typer
 
-from palpate.app.commands.console import out, progress
+from palpate.app.commands.console import DatasetFolder, out, progress
 from palpate.app.commands.diagnosis import true_effects
 
 __all__ = ["train"]
 
 
 def train(
-    dataset: Annotated[Path, typer.Argument(help="A dataset folder.", show_default=False)],
+    dataset: DatasetFolder,
     run: Annotated[
         str | None,
         typer.Option(

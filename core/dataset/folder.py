@@ -197,7 +197,8 @@ def sequence_names(root: Path) -> list[str]:
         if name.endswith(_BAGS):
             raise problem(
                 f"sequences/{name}",
-                "bags are not read in place; expected a folder: run palpate import FOLDER --to NEW",
+                "bags are read where dataset.toml has [topics]; expected a folder: add it, or run "
+                "palpate import FOLDER --to NEW",
             )
         if not name.isprintable():
             raise problem(

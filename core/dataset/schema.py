@@ -119,11 +119,7 @@ def read_config(root: Path) -> DatasetConfig:
     if (version := top.take("format")) != 1 or isinstance(version, bool):
         raise top.wrong("format", version, "1, the only version there is: convert the dataset")
     if "topics" in top.values:
-        raise top.wrong(
-            "topics",
-            None,
-            "a dataset without it: bags are not read in place, run palpate import FOLDER --to NEW",
-        )
+        raise top.wrong("topics", None, "no such table where no sequence is a bag: leave it out")
     return DatasetConfig(
         name=top.name("name"),
         **_phantom(top.table("phantom")),

@@ -16,16 +16,16 @@ from palpate.foundation.progress import Report, part, silent
 from palpate.importing.clocks.track import Stamps
 from palpate.importing.cutting.pushes import LocatedPhantom, find_pushes, whole_recording
 from palpate.importing.cutting.split_proposal import proposed_splits
-from palpate.importing.earlier_import import EarlierImport, file_digests, window_digest
 from palpate.importing.force_in_robot import forces_in_robot
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.mapping_file import MAPPING, mapping_text
-from palpate.importing.recorded_clouds import RecordedClouds
+from palpate.importing.output.earlier_import import EarlierImport, file_digests, window_digest
+from palpate.importing.output.recorded_clouds import RecordedClouds
+from palpate.importing.output.stated_setup import check_setup, found_phantom, write_setup
+from palpate.importing.output.written_dataset import IMPORTED, DatasetWriter
 from palpate.importing.recording import Recording, opened_recording
 from palpate.importing.rules import ImportMapping, SequenceWindow
-from palpate.importing.stated_setup import check_setup, found_phantom, write_setup
 from palpate.importing.timed_recording import TimedRecording, timed_recording
-from palpate.importing.written_dataset import IMPORTED, DatasetWriter
 
 __all__ = ["ImportedDataset", "import_recordings"]
 

@@ -10,11 +10,11 @@ from typing import Any
 from palpate.dataset.files import read_toml
 from palpate.foundation.errors import DatasetError
 from palpate.importing.import_notes import ImportNotes
+from palpate.importing.output.stated_setup import SETUP_TABLES
 from palpate.importing.proposed_mapping import proposed_mapping, recording_name
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ColumnRules, ImportMapping, RestRules
 from palpate.importing.sources.opened_sources import is_source, open_source
-from palpate.importing.stated_setup import SETUP_TABLES
 from palpate.importing.stream import Source
 
 __all__ = ["Survey", "survey"]

@@ -149,9 +149,10 @@ class _Handle:
         self.entries[:] = data
         return self.run(_FACTORISE)
 
-    def __del__(self) -> None:
-        # At interpreter exit the memory goes anyway, and the library may be gone first.
-        if not sys.is_finalizing():
+    def __del__(self, exits: Callable[[], bool] = sys.is_finalizing) -> None:
+        # At interpreter exit the memory goes anyway, and the library may be gone first, as may the
+        # names of this module.
+        if not exits():
             self.run(_RELEASE)
 
 

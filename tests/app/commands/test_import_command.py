@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from bench_recording import BenchRecording, bench_setup
+from recorded_bags import write_sequence_bag
+from small_dataset import write_valid_dataset
 
 from palpate.app.cli import main
 from palpate.app.commands import console
 from palpate.dataset import open_dataset
+from palpate.importing.opened_bags import CACHE
 
 Palpate = Callable[..., tuple[int, str, str]]
 
@@ -109,3 +113,22 @@ def test_without_any_file_it_is_said_what_is_expected(palpate: Palpate) -> None:
     code, _, err = palpate("import")
     assert code == 2
     assert "expected recordings, or --mapping" in err
+
+
+def test_verbs_open_a_dataset_with_bags(
+    palpate: Palpate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tables, bags = write_valid_dataset(tmp_path / "tables"), tmp_path / "bags"
+    shutil.copytree(tables, bags, ignore=shutil.ignore_patterns("sequences"))
+    topics = '[topics]\npose = "/PSM1/measured_cp"\ncloud = "/camera/points"\n'
+    (bags / "dataset.toml").write_text((tables / "dataset.toml").read_text() + topics)
+    (bags / "sequences").mkdir()
+    for name in ("poke-01", "drag-01"):
+        write_sequence_bag(tables, name, bags / "sequences" / f"{name}.bag", "ros1")
+    monkeypatch.setenv(CACHE, str(tmp_path / "cache"))
+    code, out, err = palpate("register", bags)
+    assert code == 0, err
+    assert "phantom from robot" in out and "opened as" in err
+    (bags / "sequences" / "poke-01.bag").write_bytes(b"no bag")
+    code, _, err = palpate("check", bags)
+    assert code == 2 and "poke-01.bag cannot be read" in err

@@ -9,11 +9,13 @@ import pytest
 from recorded_bags import BAG_KINDS, BagKind, write_sequence_bag
 from small_dataset import write_valid_dataset
 
+import palpate
 from palpate.dataset import open_dataset
 from palpate.foundation.errors import DatasetError
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.import_recording import import_recordings
 from palpate.importing.mapping_file import mapping_text, read_mapping
+from palpate.importing.opened_bags import CACHE
 from palpate.importing.survey import survey
 
 SEQUENCES = ("poke-01", "drag-01")
@@ -138,7 +140,9 @@ def test_a_failed_import_leaves_nothing_behind(original: Path, tmp_path: Path) -
     assert [one.name for one in tmp_path.iterdir()] == ["bags"]
 
 
-def test_topics_of_a_dataset_with_bags_name_the_streams(original: Path, tmp_path: Path) -> None:
+@pytest.fixture
+def with_bags(original: Path, tmp_path: Path) -> Path:
+    """The dataset with a bag for each sequence, named by [topics]."""
     folder = tmp_path / "with-bags"
     (folder / "sequences").mkdir(parents=True)
     for file in ("touches.csv", "rest.ply"):
@@ -147,8 +151,26 @@ def test_topics_of_a_dataset_with_bags_name_the_streams(original: Path, tmp_path
     (folder / "dataset.toml").write_text((original / "dataset.toml").read_text() + topics)
     for name in SEQUENCES:
         write_sequence_bag(original, name, folder / "sequences" / f"{name}.bag", "ros1")
-    found = survey([folder], None)
+    return folder
+
+
+def test_topics_of_a_dataset_with_bags_name_the_streams(with_bags: Path, tmp_path: Path) -> None:
+    found = survey([with_bags], None)
     mapping = found.proposal("again", ImportNotes())
     found.close()
     import_recordings(mapping, tmp_path, tmp_path / "made", ImportNotes())
     assert open_dataset(tmp_path / "made").sequence("poke-01").forces is not None
+
+
+def test_a_dataset_with_bags_opens_directly_and_the_second_time_at_once(
+    original: Path, with_bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(CACHE, str(tmp_path / "cache"))
+    opened = palpate.open_dataset(with_bags)
+    assert_same(original, opened.path)
+    changed = (opened.path / "dataset.toml").stat().st_mtime_ns
+    assert palpate.open_dataset(with_bags).path == opened.path
+    assert (opened.path / "dataset.toml").stat().st_mtime_ns == changed
+    (with_bags / "touches.csv").touch()
+    assert palpate.open_dataset(with_bags).path != opened.path
+    assert palpate.open_dataset(original).path == original

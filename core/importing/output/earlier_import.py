@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from palpate.importing.output.written_dataset import IMPORTED, folder_size
 from palpate.importing.rules import ImportMapping, SequenceWindow
-from palpate.importing.written_dataset import IMPORTED, folder_size
 
 __all__ = ["EarlierImport", "file_digests", "window_digest"]
 

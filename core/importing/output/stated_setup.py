@@ -15,9 +15,9 @@ from palpate.importing.cutting.dwells import find_touches
 from palpate.importing.cutting.pushes import LocatedPhantom
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.mapping_file import toml_text
+from palpate.importing.output.written_dataset import DatasetWriter
 from palpate.importing.rules import ImportMapping
 from palpate.importing.timed_recording import TimedRecording
-from palpate.importing.written_dataset import DatasetWriter
 from palpate.registration.robot.robot_statements import robot_fits, touched_centres
 
 __all__ = ["SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]

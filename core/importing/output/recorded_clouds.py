@@ -14,11 +14,11 @@ from palpate.importing.cutting.pushes import LocatedPhantom
 from palpate.importing.cutting.rest_average import averaged_cloud, untouched_clouds
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.messages.pinhole_camera import PinholeCamera
+from palpate.importing.output.written_dataset import DatasetWriter
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ImportMapping, SequenceWindow
 from palpate.importing.sources.cloud_file import read_cloud_file
 from palpate.importing.timed_recording import TimedRecording
-from palpate.importing.written_dataset import DatasetWriter
 
 __all__ = ["RecordedClouds"]
 

@@ -1,0 +1,1 @@
+"""The dataset that an import writes: setup, sequences, clouds, and what an earlier one left."""
