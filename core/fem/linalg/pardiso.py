@@ -6,6 +6,7 @@ import ctypes
 import logging
 import math
 import sys
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 

@@ -11,23 +11,20 @@ __all__ = ["proposed_splits"]
 
 
 def proposed_splits(windows: Sequence[SequenceWindow]) -> dict[str, list[str]]:
-    """Propose splits: of each kind the first trains, a second push from the top validates, others
-    test; traces are in none.
+    """Propose splits: the pushes of each kind train and test in turn, the first trains.
 
-    A single sequence trains; of two the second tests.
+    Of the first kind with three or more the second one validates. Traces are in no split.
     """
     splits: dict[str, list[str]] = {"train": [], "validation": [], "test": []}
-    seen: dict[str, int] = {}
     pushes = [one for one in windows if one.kind != "trace"] or list(windows)
+    kinds: dict[str, list[str]] = {}
     for one in pushes:
-        kind = one.kind or _stem(one.name)
-        number = seen[kind] = seen.get(kind, 0) + 1
-        if number == 1:
-            splits["train"].append(one.name)
-        elif number == 2 and not splits["validation"] and len(pushes) > 2:
-            splits["validation"].append(one.name)
-        else:
-            splits["test"].append(one.name)
+        kinds.setdefault(one.kind or _stem(one.name), []).append(one.name)
+    for names in kinds.values():
+        if len(names) > 2 and not splits["validation"]:
+            splits["validation"].append(names.pop(1))
+        splits["train"] += names[::2]
+        splits["test"] += names[1::2]
     return splits
 
 

@@ -11,6 +11,7 @@ from bench_recording import CORNERS, ROBOT_FROM_PHANTOM, BenchRecording, bench_s
 
 from palpate.dataset import open_dataset
 from palpate.foundation.errors import DatasetError
+from palpate.importing.cutting.split_proposal import proposed_splits
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.import_recording import import_recordings
 from palpate.importing.mapping_file import read_mapping
@@ -78,7 +79,40 @@ def test_the_rest_cloud_is_the_median_of_untouched_frames(made: tuple[Path, Impo
 def test_splits_are_proposed_by_kind(made: tuple[Path, ImportNotes]) -> None:
     config = open_dataset(made[0]).config
     assert set(config.train) == {"drag-01", "poke-side-01", "poke-top-01"}
-    assert config.validation == ("poke-top-02",)
+    assert (config.validation, config.test) == ((), ("poke-top-02",))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "train", "validation", "test"),
+    [
+        ("t", "t1", "", ""),
+        ("tts", "t1 s1", "", "t2"),
+        ("ttt", "t1", "t2", "t3"),
+        ("ssstttttt", "s1 t1 t3 t5", "s2", "s3 t2 t4 t6"),
+        ("tdd", "t1 d1", "", "d2"),
+    ],
+)
+def test_pushes_of_each_kind_train_and_test_in_turn(
+    kinds: str, train: str, validation: str, test: str
+) -> None:
+    names = {"t": "top", "s": "side", "d": "drag"}
+    windows = [
+        SequenceWindow.model_validate(
+            {
+                "name": f"{kind}{kinds[: at + 1].count(kind)}",
+                "recording": "one",
+                "start": at,
+                "end": at + 1,
+                "kind": names[kind],
+            }
+        )
+        for at, kind in enumerate(kinds)
+    ]
+    assert proposed_splits(windows) == {
+        "train": train.split(),
+        "validation": validation.split(),
+        "test": test.split(),
+    }
 
 
 def test_weight_and_zero_are_fitted_where_the_tool_turned(made: tuple[Path, ImportNotes]) -> None:
