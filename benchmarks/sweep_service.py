@@ -91,7 +91,8 @@ def run(points: int = POINTS) -> list[Table]:
 def _loop(home: Path, points: int) -> tuple[float, FloatArray]:
     began = time.monotonic()
     space = ParameterSpace((Axis("tool_radius.radius", LOW, HIGH),))
-    stated, data = read_sweep_data(open_dataset(home / "datasets" / "phantom"), (), FRAMES)
+    read = read_sweep_data(open_dataset(home / "datasets" / "phantom"), (), FRAMES)
+    stated, data = read.stated, read.sequences
     grid = REPLAY_GRID.for_tool(stated.tool.radius)
     errors = []
     for values in next(point_batches(SweepSpec(space=space, steps=points, frames=FRAMES))):

@@ -38,7 +38,8 @@ def run(points: int) -> tuple[float, float, float]:
         make_dataset(
             Path(folder) / "phantom", Scenario(effects=(hidden,), sequences=("poke-top-01",)), 3
         )
-        stated, data = read_sweep_data(open_dataset(Path(folder) / "phantom"), (), 4)
+        read = read_sweep_data(open_dataset(Path(folder) / "phantom"), (), 4)
+        stated, data = read.stated, read.sequences
     grid = SCREEN_GRID.for_tool(stated.tool.radius)
     points_of_sweep = next(point_batches(SweepSpec(space=space, method="random", points=points)))
     tasks = [(space.setup(stated, values), 0) for values in points_of_sweep]

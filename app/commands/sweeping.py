@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from palpate.app.commands.console import DatasetFolder, RegistrationOption, out, progress
@@ -37,7 +38,7 @@ def sweep(
         list[str] | None, typer.Option(help="Sequences to replay; all if omitted.")
     ] = None,
     frames: Annotated[
-        int, typer.Option(help="Touched clouds of each sequence, evenly spread.")
+        int, typer.Option(help="Clouds of each sequence: deep pushes that differ.")
     ] = 8,
     measure: Annotated[
         str, typer.Option(help="distance (RMS of patch averages) or paper (mean distance).")
@@ -135,21 +136,22 @@ def _print(result: dict[str, Any], rows: list[dict[str, Any]], units: dict[str, 
         values = (quantity(row["values"][name], unit) for name, unit in units.items())
         table.add_row(*values, *(f"{1e3 * row[key]:.4f} mm" for key in ("error", "paper")))
     out.print(table)
-    if result["stated"] is not None:
-        out.print(
-            f"as stated: {1e3 * result['stated']:.4f} mm; {result['points']} points, "
-            f"{result['failed']} failed",
-            highlight=False,
-        )
+    out.print(f"[bold]{escape(result['sentence'])}[/]", highlight=False, soft_wrap=True)
+    out.print(
+        f"{result['points']} points, {result['failed']} failed; the untouched phantom is off by "
+        f"{1e3 * result['at_rest']:.4f} mm",
+        highlight=False,
+    )
     for one in result["directions"]:
         change = f"{1e3 * one['change']:.4f} mm ({1e3 * one['low']:.4f} to {1e3 * one['high']:.4f})"
-        verdict = {
-            True: "flat: the clouds say nothing of it",
-            False: "matters",
-            None: "one push only, so nobody knows whether it matters",
-        }
-        out.print(
-            f"{one['name']}: {verdict[one['flat']]}; the error changes by {change}", highlight=False
-        )
+        out.print(f"{one['name']}: {_verdict(one)}; the error changes by {change}", highlight=False)
     for row in [row for row in rows if row["failure"]][:5]:
         out.print(f"[yellow]point {row['number']} failed[/]: {row['failure']}", highlight=False)
+
+
+def _verdict(direction: dict[str, Any]) -> str:
+    if direction["flat"] is None:
+        return "one push only, so nobody knows whether it matters"
+    if direction["flat"]:
+        return "flat: the clouds say nothing of it"
+    return "matters little" if direction["little"] else "matters"

@@ -126,6 +126,16 @@ class ParameterSpace:
                     radii.append(self.setup(stated, {axis.name: end}).tool.radius)
         return radii
 
+    def stated_values(self, stated: Setup) -> dict[str, float]:
+        """Stated value of each axis whose effect is one number; a lump that is not there has none."""
+        found = {}
+        for axis in self.axes:
+            cause, _, key = axis.name.partition(".")
+            effect = effect_named(cause)
+            if len(effect.parameters()) == 1:
+                found[axis.name] = float(getattr(effect.neutral(stated), key))
+        return found
+
     def setup(self, stated: Setup, values: Values) -> Setup:
         """Return the stated setup with these parameter values and the fixed ones.
 

@@ -20,13 +20,14 @@ from palpate.mesh.default_meshes import Use, motion_mesh
 from palpate.mesh.protocol import Meshing
 from palpate.setup.setup import Setup
 from palpate.sweep.executors import ReplayExecutor, make_executor, run_tasks
-from palpate.sweep.flat_directions import assess_direction
+from palpate.sweep.flat_directions import assess_direction, assess_gain
 from palpate.sweep.parameter_space import Axis, Values
 from palpate.sweep.replay_cache import ReplayCache, replay_key
 from palpate.sweep.result_rows import ResultRows
 from palpate.sweep.samplers import point_batches
 from palpate.sweep.sweep_data import SweepSequence, read_sweep_data
 from palpate.sweep.sweep_error import ReplayResult, error_from_sums
+from palpate.sweep.sweep_sentence import sweep_sentence
 from palpate.sweep.sweep_spec import SweepSpec
 
 __all__ = ["run_sweep"]
@@ -65,22 +66,23 @@ def run_sweep(
     registered = {"registration": dataset.accepted.name} if dataset.accepted else {}
     made = made_from(dataset.path)
     _claim(folder, {**request.to_json(), "dataset": str(dataset.path.name), **registered}, made)
-    stated, data = read_sweep_data(
+    read = read_sweep_data(
         dataset, request.sequences, request.frames, part(report, 0.0, 0.05), request.space
     )
-    grid = grid or _mesh_of(stated, data)
-    executor = make_executor(workers, scheduler, data, grid)
+    grid = grid or _mesh_of(read.stated, read.sequences)
+    executor = make_executor(workers, scheduler, read.sequences, grid)
     try:
         run = _SweepRun(
             request,
-            stated,
-            data,
+            read.stated,
+            read.sequences,
             grid,
             executor,
             ReplayCache(store),
             ResultRows(folder / "points.jsonl"),
             part(report, 0.05, 1.0),
             {**made, "seed": request.seed},
+            read.rest_error(grid, request.measure),
         )
         summary = {**run.run(), "made_from": {**made, "seed": request.seed}}
         check_unchanged(dataset.path, made)
@@ -127,6 +129,7 @@ class _SweepRun:
     Attributes:
         points: the rows of all points so far.
         made: digests of data and code, version, commit and seed, which every row states.
+        at_rest: error of the untouched phantom [m], which no push explains.
         sums: sums (p, 4) over the pushes of all sequences, by the number of each solved point.
         old: rows of an earlier, interrupted run by number.
         computed: number of replays that were not in the cache.
@@ -144,10 +147,11 @@ class _SweepRun:
         rows: ResultRows,
         report: Report,
         made: dict[str, Any],
+        at_rest: float,
     ) -> None:
         self.request, self.stated, self.data, self.grid = request, stated, data, grid
         self.executor, self.store, self.rows, self.report = executor, store, rows, report
-        self.made = made
+        self.made, self.at_rest = made, at_rest
         self.digests = [item.digest for item in data]
         self.points: list[dict[str, Any]] = []
         self.sums: dict[int, FloatArray] = {}
@@ -175,7 +179,7 @@ class _SweepRun:
         )
         best = self._best()
         failed = [row for row in self.points if row["error"] is None]
-        return {
+        summary = {
             "format": 1,
             "request": self.request.to_json(),
             "measure": self.request.measure,
@@ -184,12 +188,24 @@ class _SweepRun:
             "frames": sum(len(item.times) for item in self.data),
             "probes": sum(len(np.unique(item.probes)) for item in self.data),
             "stated": self.points[0]["error"],
+            "stated_values": self.request.space.stated_values(self.stated),
+            "at_rest": self.at_rest,
             "best": best,
+            "gain": self._gain(best),
             "points": len(self.points),
             "failed": len(failed),
             "replays_computed": self.computed,
             "directions": [one for one in directions if one],
         }
+        return {**summary, "sentence": sweep_sentence(summary)}
+
+    def _gain(self, best: dict[str, Any] | None) -> dict[str, float] | None:
+        """Gain of the best point over the stated setup; None without either."""
+        if best is None or 0 not in self.sums:
+            return None
+        tried = sum(row["error"] is not None for row in self.points) - 1
+        found = self.sums[best["number"]]
+        return assess_gain(self.sums[0], found, tried, self.request.measure, self.request.seed)
 
     def _best(self) -> dict[str, Any] | None:
         known = [row for row in self.points if row["error"] is not None and row["kind"] != "stated"]

@@ -14,11 +14,18 @@ from palpate.experiment import Experiment, sequences_with_clouds
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.foundation.progress import Report, silent
+from palpate.measurement.camera_model import camera_model_for
+from palpate.measurement.metrics import paper_distance
+from palpate.measurement.patch_averages import patch_means
+from palpate.measurement.surface_gaps import gaps
+from palpate.mesh.protocol import Meshing
+from palpate.replay.replay import rest
 from palpate.setup.phantom_geometry import CLEARANCE
 from palpate.setup.setup import Setup
+from palpate.sweep.frame_choice import informative_frames
 from palpate.sweep.parameter_space import ParameterSpace
 
-__all__ = ["SweepSequence", "read_sweep_data"]
+__all__ = ["SweepData", "SweepSequence", "read_sweep_data"]
 
 _MOST_POINTS = 6000
 """Points kept of a cloud."""
@@ -57,19 +64,48 @@ class SweepSequence:
         return digest.hexdigest()
 
 
+@dataclass(frozen=True, eq=False)
+class SweepData:
+    """The clouds that a sweep compares its replays with.
+
+    Attributes:
+        stated: the stated setup with its registrations.
+        sequences: frames in which the tool touches.
+        rest: the phantom's points (n, 3) [m] in the rest cloud, camera frame.
+    """
+
+    stated: Setup
+    sequences: tuple[SweepSequence, ...]
+    rest: FloatArray
+
+    def rest_error(self, grid: Meshing, measure: str) -> float:
+        """Error of the untouched phantom [m]: of sensor and registration, which no push explains.
+
+        `measure` as of `palpate.sweep.sweep_error.error_from_sums`.
+        """
+        surface, sight = self.stated.surface(), camera_model_for(self.stated, reference=True)
+        points, frame = sight.place(self.rest), rest(self.stated, grid)
+        if measure == "paper":
+            return float(paper_distance(points[::2], frame, surface))
+        met = gaps(points, sight.pose.translation, frame, surface)
+        means = patch_means(met.gap, met.patch, surface.patches)
+        known = np.isfinite(means.mean)
+        return float(np.sqrt(np.average(means.mean[known] ** 2, weights=means.count[known])))
+
+
 def read_sweep_data(
     dataset: Dataset,
     names: Sequence[str],
     frames: int,
     report: Report = silent,
     space: ParameterSpace | None = None,
-) -> tuple[Setup, tuple[SweepSequence, ...]]:
-    """Return the stated setup with its registrations, and frames in which the tool touches.
+) -> SweepData:
+    """Register a dataset and read the frames of a sweep.
 
     Args:
         dataset: the dataset.
         names: sequences to use; all with clouds if empty.
-        frames: most frames of each sequence, evenly spread.
+        frames: most frames of each sequence, those that press deepest and differ most.
         report: receives the progress.
         space: what will be swept; points on any of its tools are removed from the clouds, so that
             all setups are compared with the same points.
@@ -87,17 +123,15 @@ def read_sweep_data(
         sequence = experiment.dataset.sequence(name)
         times = np.asarray(sequence.cloud_times)
         centres = setup.phantom_from_robot.apply(smooth_centres(sequence.kinematics, times))
-        touched = setup.geometry.distance(centres) <= setup.tool.radius + CLEARANCE
+        depth = setup.tool.radius - setup.geometry.distance(centres)
+        touched = depth >= -CLEARANCE
         probes = np.cumsum(np.diff(touched.astype(int), prepend=0) > 0)
-        near = np.flatnonzero(touched)
-        if not len(near):
+        if not touched.any():
             raise DatasetError(
                 f"{name}: the tool touches the phantom in no cloud; choose other sequences",
                 file=f"sequences/{name}",
             )
-        chosen = near[
-            np.unique(np.linspace(0, len(near) - 1, min(len(near), frames)).round().astype(int))
-        ]
+        chosen = informative_frames(centres, depth, touched, frames)
         observed = experiment.observe(name, chosen, keep=_subsampled, radii=radii)
         sequences.append(
             SweepSequence(
@@ -108,7 +142,9 @@ def read_sweep_data(
                 probes[chosen].astype(float),
             )
         )
-    return setup, tuple(sequences)
+    raw = dataset.rest_cloud()
+    untouched = raw[experiment.cleaner.clean(raw).indices]
+    return SweepData(setup, tuple(sequences), _subsampled(untouched))
 
 
 def _subsampled(points: FloatArray) -> FloatArray:

@@ -29,7 +29,7 @@ class SweepSpec:
         levels: levels of a grid; each spans one step to both sides of the best point before.
         points: number of points of the other methods.
         sequences: names of the sequences; all with clouds if empty.
-        frames: most clouds of each sequence in which the tool touches, evenly spread.
+        frames: most clouds of each sequence in which the tool touches: deep ones that differ.
         measure: the error: "distance", the RMS of patch averages of the signed distance, or
             "paper", the mean distance of Wu, Kazanzides and Unberath (2020).
         seed: seed of all random draws.

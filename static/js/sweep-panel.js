@@ -507,6 +507,7 @@ function draw(sweep, points, stop, replay, again) {
     high,
     log: low > 0 && high / low > 30,
     label: readableName(name.split(".")[1]),
+    stated: summary?.stated_values?.[name],
     unit: unitOf(name)[1],
     show: (value) => formatValue(name, value),
     plain: (value) => `${+(value * unitOf(name)[0]).toPrecision(3)}`,
@@ -522,7 +523,7 @@ function draw(sweep, points, stop, replay, again) {
         ? element("span", { class: "verdict-tag none", "data-state": job.state }, job.state)
         : null,
     ),
-    element("h1", { class: "verdict" }, sentence(best, stated, drawn, running !== null)),
+    element("h1", { class: "verdict" }, summary?.sentence ?? sentence(best, running !== null)),
     changedDataNote(sweep),
     running
       ? element(
@@ -555,7 +556,7 @@ function draw(sweep, points, stop, replay, again) {
               again();
             },
           },
-          sweepPlot(drawn, swept, stated, best?.number),
+          sweepPlot(drawn, swept, stated, best?.number, summary?.at_rest),
           element(
             "div",
             { class: "sweep-keys" },
@@ -568,6 +569,9 @@ function draw(sweep, points, stop, replay, again) {
                 )
               : null,
             drawn.length === 1 ? element("span", {}, "- - as stated") : null,
+            drawn.length === 1 && summary?.at_rest !== undefined
+              ? element("span", {}, "··· untouched phantom")
+              : null,
             drawn.length > 2 ? element("span", {}, "thick: the best") : null,
             failed.length
               ? element("span", { "data-failures": failed.length }, `✕ ${failed.length} failed`)
@@ -628,19 +632,14 @@ function heldNote(fixed) {
 }
 
 /**
+ * Say the least error so far; where it lies is said when all points are there.
  * @param {BestPoint | null} best
- * @param {number | null} stated error of the setup as stated [m]
- * @param {PlotAxis[]} drawn
  * @param {boolean} running
  * @returns {string}
  */
-function sentence(best, stated, drawn, running) {
+function sentence(best, running) {
   if (!best) return running ? "Reading the clouds …" : "No point has an error.";
-  const where = drawn
-    .map(({ name, label }) => `${label} ${formatValue(name, best.values[name])}`)
-    .join(", ");
-  const reference = stated === null ? "" : `; ${formatError(stated)} as stated`;
-  return `Least error ${formatError(best.error)} at ${where}${reference}.`;
+  return `Least error so far ${formatError(best.error)}.`;
 }
 
 /**
@@ -648,8 +647,8 @@ function sentence(best, stated, drawn, running) {
  * @param {SweepDirection} direction
  * @returns {HTMLElement}
  */
-const directionCard = ({ name, flat, change, low, high }) => {
-  const verdict = flat ? "flat" : flat === null ? "unknown" : "matters";
+const directionCard = ({ name, flat, change, low, high, little, least, edge }) => {
+  const verdict = flat === null ? "unknown" : flat ? "flat" : little ? "matters little" : "matters";
   const [lowest, highest] = [formatErrorChange(low), formatErrorChange(high)];
   return element(
     "div",
@@ -661,8 +660,15 @@ const directionCard = ({ name, flat, change, low, high }) => {
       : flat === null
         ? "Only one push was compared, so nobody knows what chance does; " +
           "take more sequences or clouds. "
-        : "",
+        : little
+          ? "The change is sure, but smaller than a model and a real phantom differ anyway. "
+          : "",
     `From best to worst the error changes by ${formatErrorChange(change)}`,
     flat === null ? "." : ` (95 % interval ${lowest} to ${highest}).`,
+    least && !little
+      ? ` It is least from ${formatValue(name, least[0])} to ${formatValue(name, least[1])}` +
+          " (95 % of the pushes drawn anew)."
+      : "",
+    edge ? " The least lies at the edge of the range: widen it." : "",
   );
 };

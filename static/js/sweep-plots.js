@@ -19,10 +19,11 @@ const HIGH = [224, 152, 32];
  * @param {SweepPoint[]} points
  * @param {number | null} stated error of the setup as stated [m]
  * @param {number} [best] number of the best point
+ * @param {number} [atRest] error of the untouched phantom [m]
  * @returns {Element}
  */
-export function sweepPlot(axes, points, stated, best) {
-  if (axes.length === 1) return linePlot(axes[0], points, stated, best);
+export function sweepPlot(axes, points, stated, best, atRest) {
+  if (axes.length === 1) return linePlot(axes[0], points, stated, best, atRest);
   const known = points.map(({ error }) => error).filter(isKnown);
   /** @type {Range} */
   const range = known.length ? [Math.min(...known), Math.max(...known)] : [0, 1];
@@ -181,13 +182,15 @@ const toX = (share) => MARGIN.left + share * (WIDTH - MARGIN.left - MARGIN.right
  * @param {SweepPoint[]} points
  * @param {number | null} stated
  * @param {number} [best]
+ * @param {number} [atRest]
  * @returns {SVGElement}
  */
-function linePlot(axis, points, stated, best) {
+function linePlot(axis, points, stated, best, atRest) {
   const known = points.flatMap(({ error, values }) =>
     isKnown(error) ? [{ error, value: values[axis.name] }] : [],
   );
-  const errors = [...known.map(({ error }) => error), ...(stated === null ? [] : [stated])];
+  const levels = [stated, atRest ?? null].filter(isKnown);
+  const errors = [...known.map(({ error }) => error), ...levels];
   const [least, most] = errors.length ? [Math.min(...errors), Math.max(...errors)] : [0, 1e-3];
   const room = Math.max((most - least) * 0.12, most * 0.02);
   const [from, to] = [Math.max(0, least - room), most + room];
@@ -216,6 +219,13 @@ function linePlot(axis, points, stated, best) {
           class: "stated",
           d: `M${MARGIN.left} ${y(stated)}H${WIDTH - MARGIN.right}`,
         }),
+    atRest === undefined
+      ? null
+      : svgElement("path", {
+          class: "at-rest",
+          d: `M${MARGIN.left} ${y(atRest)}H${WIDTH - MARGIN.right}`,
+        }),
+    statedMark(axis),
     svgElement("polyline", {
       stroke: "var(--line-strong)",
       points: sorted
@@ -238,6 +248,22 @@ function linePlot(axis, points, stated, best) {
         pointTitle([axis], point),
       );
     }),
+  );
+}
+
+/**
+ * Create the mark of a parameter's stated value on the lower axis; null outside of the range.
+ * @param {PlotAxis} axis
+ * @returns {SVGElement | null}
+ */
+function statedMark(axis) {
+  const { stated, low, high } = axis;
+  if (stated === undefined || stated < low || stated > high) return null;
+  const [x, y] = [toX(shareOf(axis, stated)), toY(0)];
+  return svgElement(
+    "path",
+    { class: "stated-value", "data-stated": stated, d: `M${x} ${y}l-5 9h10z` },
+    svgElement("title", {}, `stated: ${axis.show(stated)}`),
   );
 }
 
@@ -310,6 +336,7 @@ function heatMap(axes, points, range, best) {
       "aria-label": `Error over ${across.label} and ${upright.label}`,
     },
     axes2d(across, upright.label + (upright.unit ? `, ${upright.unit}` : ""), ticks),
+    statedMark(across),
     points.map(spot),
     mark
       ? svgElement("circle", { class: "best over", cx: centre[0], cy: centre[1], r: 5.5 })

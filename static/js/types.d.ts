@@ -438,6 +438,8 @@ export interface SweepBounds {
 /** A swept parameter as an axis of a plot. */
 export interface PlotAxis extends SweepBounds {
   log: boolean;
+  /** Value of the setup as stated; undefined where it has none. */
+  stated?: number;
   label: string;
   unit: string;
   /** A value with its unit. */
@@ -460,6 +462,9 @@ export interface SweepDirection {
   change: number;
   low: number;
   high: number;
+  little?: boolean;
+  least?: [number, number] | null;
+  edge?: "" | "low" | "high";
 }
 
 export interface Sweep {
@@ -469,7 +474,12 @@ export interface Sweep {
     parameters: { parameter: string; low: number; high: number }[];
     fixed?: Record<string, number | string>;
   } | null;
-  summary: { directions: SweepDirection[] } | null;
+  summary: {
+    directions: SweepDirection[];
+    sentence?: string;
+    at_rest?: number;
+    stated_values?: Record<string, number>;
+  } | null;
   data_changed: boolean | null;
 }
 

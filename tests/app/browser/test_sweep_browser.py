@@ -98,7 +98,9 @@ def test_what_is_wrong_is_said_in_the_form_and_then_a_sweep_is_followed_to_its_e
     page.fill("input[name=steps]", "5")
     page.press("input[name=steps]", "Enter")
     page.wait_for_selector("[data-direction]", timeout=LONG)
-    assert "radius 6 mm" in page.locator("#panel-sweep h1").inner_text()
+    headline = page.locator("#panel-sweep h1").inner_text()
+    assert "tool radius 6.00" in headline and "as stated" in headline
+    assert page.get_attribute("#panel-sweep [data-stated]", "data-stated") == "0.005"
     assert page.locator("#panel-sweep circle[data-point]").count() == 5
     assert page.get_attribute("[data-direction='tool_radius.radius']", "data-flat") == "false"
 
@@ -113,6 +115,8 @@ def test_two_parameters_are_a_map_and_a_flat_one_is_called_flat(page: Any) -> No
     page.wait_for_selector("[data-direction='young_modulus.E'][data-flat=true]", timeout=LONG)
     assert page.locator("#panel-sweep rect[data-point]").count() == 9
     assert "flat" in page.locator("[data-direction='young_modulus.E']").inner_text()
+    headline = page.locator("#panel-sweep h1").inner_text()
+    assert "cannot tell young modulus" in headline and "kPa" not in headline
 
 
 def test_a_long_one_is_stopped_and_its_points_are_there_after_a_reload(page: Any) -> None:

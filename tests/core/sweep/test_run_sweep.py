@@ -59,6 +59,11 @@ def test_refined_grid_finds_the_hidden_radius_and_it_is_not_flat(
     (direction,) = summary["directions"]
     assert direction["flat"] is False
     assert 0 < direction["low"] < direction["change"] < direction["high"]
+    assert direction["least"][0] < 6.1e-3 and direction["least"][1] > 5.9e-3
+    assert (direction["little"], direction["edge"]) == (False, "")
+    assert 0 < summary["gain"]["low"] < summary["gain"]["value"]
+    assert 0 < summary["at_rest"] < summary["best"]["error"] * 1.5
+    assert summary["sentence"].startswith("Least error 0.") and "tool radius" in summary["sentence"]
     # Two of five points of each later level repeat points of the level before.
     assert summary["points"] == 16 and summary["replays_computed"] < 13
 
@@ -71,6 +76,8 @@ def test_other_methods_report_the_modulus_flat_and_not_the_radius(
     summary = sweep(phantom, tmp_path, SweepSpec(space=space, method=method, points=16, frames=4))
     flat = {one["name"]: one["flat"] for one in summary["directions"]}
     assert flat == {"tool_radius.radius": False, "young_modulus.E": True}
+    assert "cannot tell young modulus" in summary["sentence"]
+    assert "kPa" not in summary["sentence"]
     assert summary["best"]["values"]["tool_radius.radius"] == pytest.approx(6e-3, abs=1.2e-3)
 
 
@@ -88,7 +95,8 @@ def test_failed_points_are_stored_with_their_reason(phantom: Path, tmp_path: Pat
 
 
 def test_task_of_a_killed_process_is_repeated(phantom: Path) -> None:
-    stated, data = read_sweep_data(open_dataset(phantom), (), 2)
+    read = read_sweep_data(open_dataset(phantom), (), 2)
+    stated, data = read.stated, read.sequences
     tasks = [(RADIUS_SPACE.setup(stated, {RADIUS.name: value}), 0) for value in RADIUS.line(4)]
     executor, results, killed = ProcessExecutor(2, data, GRID), {}, False
     try:
@@ -180,7 +188,8 @@ def test_dask_cluster_gives_the_same_points(phantom: Path, tmp_path: Path) -> No
 
 
 def test_error_is_computed_from_the_sums(phantom: Path) -> None:
-    stated, data = read_sweep_data(open_dataset(phantom), (), 3)
+    read = read_sweep_data(open_dataset(phantom), (), 3)
+    stated, data = read.stated, read.sequences
     sums = np.array(replay_errors(stated, data[0], GRID).sums)
     assert error_from_sums(sums.sum(axis=0), "distance") == pytest.approx(
         np.sqrt(sums[:, 0].sum() / sums[:, 1].sum())
