@@ -37,7 +37,7 @@ def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
 
     `depth` [m], the measured `force` [N], and by model `forces` [N] and `iterations` have one
     number for each frame; `touching` has first and last frames of the contact spells, `worst`
-    frames in the order of their raw error, `failed` by model the frames without equilibrium.
+    frames with contact in the order of their raw error, `failed` by model the frames without equilibrium.
     """
     depth, force = push_depth(replay), contact_force(run, replay)
     iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")
@@ -59,7 +59,7 @@ def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
             name: [Outcome.reason(int(code)) for code in codes if code]
             for name, codes in by_model(replay, "outcome").items()
         },
-        "worst": worst_frames(replay["distance_raw"]),
+        "worst": worst_frames(np.where(depth > 0, replay["distance_raw"], np.nan)),
     }
 
 

@@ -87,6 +87,16 @@ def test_worst_frames_are_the_peaks_the_highest_first() -> None:
     assert worst_frames(np.full(3, np.nan)) == []
 
 
+def test_a_frame_without_contact_is_none_of_the_worst(run: Run, replay: RecordedReplay) -> None:
+    errors = np.array([1.0, 2.0, 9.0, 2.0, 1.0]) * 1e-4
+    centres = np.array(replay["tool_raw"])
+    told = timeline_series(run, moved(replay, distance_raw=errors))
+    assert told["worst"][0] == 2
+    centres[2, 2] += 0.1
+    told = timeline_series(run, moved(replay, distance_raw=errors, tool_raw=centres))
+    assert 2 not in told["worst"] and told["worst"]
+
+
 def test_a_peak_beside_a_higher_one_is_not_told_twice() -> None:
     errors = np.zeros(48)
     errors[[20, 23, 30]] = 5.0, 4.0, 1.0
