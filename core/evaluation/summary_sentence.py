@@ -38,21 +38,38 @@ def summary_sentence(ladder: Mapping[str, Any]) -> str:
     alone = not any(rung["network"] is None for rung in ladder["rungs"][1:])
     kind = "the error that moves with the tool" if alone else "the error that can be removed"
     first, *rest = names
-    worse = all(part["errors"][first]["removed"]["value"] <= -0.005 for part in both)
-    change = (
-        f"adds {_shares(first, both, -1)} to" if worse else f"removes {_shares(first, both)} of"
-    )
-    text = f"{_WHO[first]} {change} {kind}{_where(parts)}"
-    more = ", ".join(
-        f"{_WHO[name]} {'removes ' if worse else ''}{_shares(name, both)}" for name in rest
-    )
+    text = f"{_WHO[first]} {_change(first, both)}"
+    if not _is_worse(first, both):
+        text += f" of {kind}"
+    text += _where(parts)
+    more = ", ".join(f"{_WHO[name]} {_change(name, both, first)}" for name in rest)
     sentence = (text[0].upper() + text[1:] + (f"; {more}" if more else "")) + "."
     return f"{sentence} {_CAMERA_REMARK}" if alone else sentence
 
 
-def _shares(name: str, parts: Sequence[Mapping[str, Any]], sign: int = 1) -> str:
-    shares = [100 * sign * part["errors"][name]["removed"]["value"] for part in parts]
-    return " and ".join(f"{share:.0f} %".replace("-", "−") for share in shares)
+def _is_worse(name: str, parts: Sequence[Mapping[str, Any]]) -> bool:
+    return all(part["errors"][name]["removed"]["value"] <= -0.005 for part in parts)
+
+
+def _change(name: str, parts: Sequence[Mapping[str, Any]], after: str = "") -> str:
+    """Share that a model removes, or from which error to which it makes the model worse.
+
+    Args:
+        name: of the model.
+        parts: of the motions.
+        after: model whose change stands before it in the sentence, whose verb it shares.
+    """
+    if _is_worse(name, parts):
+        errors = [
+            f"{part['errors']['baseline']['error']:.2f} to {part['errors'][name]['error']:.2f} mm"
+            for part in parts
+        ]
+        return f"makes it worse ({' and '.join(errors)})"
+    shares = " and ".join(
+        f"{100 * part['errors'][name]['removed']['value']:.0f} %".replace("-", "\N{MINUS SIGN}")
+        for part in parts
+    )
+    return shares if after and not _is_worse(after, parts) else f"removes {shares}"
 
 
 def _where(parts: Mapping[str, Any]) -> str:

@@ -175,12 +175,15 @@ function ladderBar({ name, label, network }, { errors, probes, noise_floor: floo
    */
   const at = (value) => `${Math.min(100, (100 * value) / most)}%`;
   const colour = network ? "corrected" : name === "baseline" ? "raw" : "extended";
+  const worse = removed.value <= -0.005;
   const reduction =
     name === "baseline"
       ? ""
-      : `${formatPercent(removed.value)}${
-          probes === 1 ? "" : ` (${formatPercent(removed.low)} to ${formatPercent(removed.high)})`
-        }`;
+      : worse
+        ? `makes it worse: ${errors.baseline.error.toFixed(2)} to ${error.toFixed(2)} mm`
+        : `${formatPercent(removed.value)}${
+            probes === 1 ? "" : ` (${formatPercent(removed.low)} to ${formatPercent(removed.high)})`
+          }`;
   return element(
     "div",
     {
