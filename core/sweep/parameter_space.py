@@ -127,7 +127,7 @@ class ParameterSpace:
         return radii
 
     def stated_values(self, stated: Setup) -> dict[str, float]:
-        """Stated value of each axis whose effect is one number; a lump that is not there has none."""
+        """Stated value of each axis whose effect is one number; a lump not there has none."""
         found = {}
         for axis in self.axes:
             cause, _, key = axis.name.partition(".")

@@ -175,7 +175,7 @@ function ladderBar({ name, label, network }, { errors, probes, noise_floor: floo
    */
   const at = (value) => `${Math.min(100, (100 * value) / most)}%`;
   const colour = network ? "corrected" : name === "baseline" ? "raw" : "extended";
-  const worse = removed.value <= -0.005;
+  const worse = (removed.value ?? 0) <= -0.005;
   const reduction =
     name === "baseline"
       ? ""
