@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -14,6 +15,7 @@ from palpate.app.drawing.free_surface import HeightMap
 from palpate.app.drawing.view import Quantity
 from palpate.app.reporting.json_values import finite
 from palpate.app.reporting.model_comparison import compared
+from palpate.app.reporting.report_tables import chance, limit_rows, ranking_note, ranking_rows
 from palpate.app.reporting.sentences import registration_sentences, verdict_sentence
 from palpate.app.reporting.stiffness_sentences import stiffness_sentences
 from palpate.app.reporting.timeline_series import timeline_series
@@ -41,8 +43,8 @@ def listed(
 
 @router.get("/{name}")
 def one(name: str, services: CurrentServices) -> dict[str, Any]:
-    """One run: verdict sentence, phantom, and for each sequence its split and both models' errors
-    [m] in the raw model's worst frame.
+    """One run: verdict sentence, ranking and detection limits as texts, phantom, and for each
+    sequence its split and both models' errors [m] in the raw model's worst frame.
     """
     run = services.runs.get(name)
     replays = [run.replay(sequence) for sequence in run.sequences]
@@ -52,6 +54,10 @@ def one(name: str, services: CurrentServices) -> dict[str, Any]:
         "sentence": verdict_sentence(run.report, size),
         "notes": registration_sentences(run.report),
         "stiffness": stiffness_sentences(run.report),
+        "ranking": [asdict(row) for row in ranking_rows(run.report)],
+        "ranking_note": ranking_note(run.report),
+        "limits": [asdict(row) for row in limit_rows(run.report)],
+        "chances": [chance(cause.get("probability")) for cause in run.report.get("causes", [])],
         "size": size,
         "has_clouds": Path(run.origin.get("dataset", "")).is_dir() and "dataset" in run.origin,
         "sequences": [

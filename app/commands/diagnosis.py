@@ -27,11 +27,11 @@ from palpate.app.commands.console import (
     verdict_table,
     write_json,
 )
+from palpate.app.reporting.report_tables import limit_rows, ranking_note, ranking_rows
 from palpate.app.reporting.sentences import (
     control_sentences,
     determined_sentences,
     left_sentences,
-    limit_phrase,
     palpation_sentences,
     probe_sentence,
     registration_sentences,
@@ -45,10 +45,6 @@ if TYPE_CHECKING:
     from palpate.dataset.accepted_registration import AcceptedRegistration
 
 __all__ = ["diagnose", "print_report", "run_diagnosis", "true_effects", "truth_beside"]
-
-ALIKE = 0.3
-"""Least share of a pattern that another effect has to imitate to be mentioned [1]; the page has the
-same value."""
 
 
 def diagnose(
@@ -212,34 +208,28 @@ def print_report(report: dict[str, Any]) -> None:
     out.print(Panel(Group(*lines), expand=False))
     print_warnings(report.get("warnings", []))
     if report.get("ranking"):
-        out.print(_ranking(report["ranking"]))
+        out.print(_ranking(report))
     if report.get("ambiguity_map"):
-        out.print(_limits(report["ambiguity_map"]))
+        out.print(_limits(report))
 
 
-def _ranking(entries: list[dict[str, Any]]) -> Table:
-    table = Table(header_style="bold")
+def _ranking(report: dict[str, Any]) -> Table:
+    table = Table(header_style="bold", caption=ranking_note(report), caption_justify="left")
     table.add_column("effect")
     table.add_column("error removed", justify="right")
     table.add_column("probability", justify="right")
-    for entry in entries[:8]:
-        removed, probability = entry.get("error_removed"), entry.get("probability")
-        table.add_row(
-            entry["effect"],
-            *("–" if value is None else f"{100 * value:.1f} %" for value in (removed, probability)),
-        )
+    for row in ranking_rows(report):
+        table.add_row(row.effect, row.removed, row.probability, style="bold" if row.named else None)
     return table
 
 
-def _limits(rows: list[dict[str, Any]]) -> Table:
+def _limits(report: dict[str, Any]) -> Table:
     table = Table(header_style="bold", title="What this data can tell", title_justify="left")
     table.add_column("effect")
     table.add_column("would be named from")
     table.add_column("looks most like")
-    for row in rows:
-        alike = [one for one in row["alike"] if one["share"] >= ALIKE][:1]
-        like = "".join(f"{one['effect']} ({100 * one['share']:.0f} %)" for one in alike)
-        table.add_row(row["effect"], limit_phrase(row), like or "nothing else")
+    for row in limit_rows(report):
+        table.add_row(row.effect, row.size, row.like)
     return table
 
 

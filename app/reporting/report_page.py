@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from palpate.app.reporting.report_tables import (
     ladder_steps,
     limit_table,
     named_causes,
+    ranking_note,
     ranking_table,
     removed_share,
     sequence_table,
@@ -66,6 +68,7 @@ def report_page(run: Run) -> str:
         stiffness=stiffness_sentences(report),
         stiffness_picture=_image(run, "stiffness"),
         ranking=ranking_table(report),
+        ranking_note=ranking_note(report),
         limits=limit_table(report),
         controls=control_sentences(report.get("controls") or []),
         probes=[probe_sentence(row) for row in report.get("next_probe") or []],
@@ -102,6 +105,9 @@ def _provenance(run: Run) -> str:
     origin, fitted = run.origin, run.model.get("fitted_on") or []
     parts = [f"Fitted on {', '.join(map(str, fitted))}"] if fitted else []
     parts.append(f"run {run.name}")
+    if "created" in origin:
+        made_at = datetime.fromtimestamp(float(origin["created"]), UTC)
+        parts.append(f"{made_at:%Y-%m-%d %H:%M} UTC")
     if "seed" in origin:
         parts.append(f"seed {origin['seed']}")
     if "seconds" in origin:

@@ -9,17 +9,23 @@ from typing import Any
 from palpate.app.reporting.html_page import Bar, Cell, Table
 from palpate.app.reporting.model_comparison import SequenceErrors
 from palpate.app.reporting.report_plots import field_map
-from palpate.app.reporting.sentences import limit_phrase
+from palpate.app.reporting.sentences import NEVER, limit_phrase
 from palpate.foundation.quantities import NARROW, value_and_ends, words
 
 __all__ = [
+    "LimitRow",
     "NamedCause",
+    "RankingRow",
     "Removed",
     "Step",
+    "chance",
     "ladder_steps",
+    "limit_rows",
     "limit_table",
     "named_causes",
     "percent",
+    "ranking_note",
+    "ranking_rows",
     "ranking_table",
     "removed_share",
     "sequence_table",
@@ -33,6 +39,8 @@ _STEPS = (
     ("Extended + network", "extended_network", "corrected"),
     ("Noise floor", "noise_floor", "floor"),
 )
+_RANKED = 8
+"""Causes in the ranking beside the named ones."""
 _SIMILAR = 0.3
 """Least share of an effect's pattern that another one has to imitate to be mentioned [1]."""
 
@@ -71,6 +79,34 @@ class Step:
     style: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class RankingRow:
+    """A cause in the ranking.
+
+    Attributes:
+        effect: its name.
+        share: of the error that it alone removes [1], for its bar.
+        removed: the same as text.
+        probability: as text.
+        named: whether the verdict names it.
+    """
+
+    effect: str
+    share: float
+    removed: str
+    probability: str
+    named: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitRow:
+    """The smallest size of an effect that would be named, and what it looks like, as texts."""
+
+    effect: str
+    size: str
+    like: str
+
+
 @dataclass(frozen=True)
 class Removed:
     """Share of the reducible error that is removed, and the text that follows it."""
@@ -89,8 +125,8 @@ def named_causes(causes: Sequence[dict[str, Any]]) -> list[NamedCause]:
         ]
         rows += _in_file_frame(cause.get("in_file_frame", {}))
         table = Table(("", "value", "interval"), rows)
-        chance = percent(cause.get("probability"))
-        named.append(NamedCause(cause["effect"], chance, table, field_map(cause)))
+        likely = chance(cause.get("probability"))
+        named.append(NamedCause(cause["effect"], likely, table, field_map(cause)))
     return named
 
 
@@ -177,27 +213,75 @@ def sequence_table(rows: Sequence[SequenceErrors]) -> Table:
     return Table(columns, cells, (2, 3, 4, 5, 6))
 
 
+def ranking_rows(report: dict[str, Any]) -> list[RankingRow]:
+    """The named causes first, then the most likely others.
+
+    Where structured error is left that no effect removes, no probability is stated: it would be
+    that of a cause which is not the whole cause.
+    """
+    causes, entries = report.get("causes", []), report.get("ranking") or []
+    listed = {entry["effect"]: entry for entry in entries}
+    gain = report.get("gain") or {}
+    together = (gain.get("reducible_removed") or {}).get("value") if len(causes) == 1 else None
+    rows = [
+        _ranked({"error_removed": together, **cause, **listed.get(cause["effect"], {})}, True, True)
+        for cause in causes
+    ]
+    named, sure = {cause["effect"] for cause in causes}, report.get("verdict") != "unexplained"
+    others = [entry for entry in entries if entry["effect"] not in named]
+    return rows + [_ranked(entry, False, sure) for entry in others[:_RANKED]]
+
+
+def _ranked(entry: dict[str, Any], named: bool, sure: bool) -> RankingRow:
+    removed = entry.get("error_removed")
+    return RankingRow(
+        effect=entry["effect"],
+        share=min(1.0, max(0.0, removed or 0.0)),
+        removed=percent(removed),
+        probability=chance(entry.get("probability")) if sure else "–",
+        named=named,
+    )
+
+
 def ranking_table(report: dict[str, Any]) -> Table:
     """Error that each cause alone removes, and its probability; named causes are coloured."""
-    named = {cause["effect"] for cause in report.get("causes", [])}
-    rows: list[tuple[str | Bar, ...]] = []
-    for entry in (report.get("ranking") or [])[:8]:
-        removed = entry.get("error_removed")
-        length = 100 * min(1.0, max(0.0, removed or 0.0))
-        bar = Bar(length, "extended" if entry["effect"] in named else "")
-        rows.append(
-            (words(entry["effect"]), bar, percent(removed), percent(entry.get("probability")))
+    rows: list[tuple[str | Bar, ...]] = [
+        (
+            words(row.effect),
+            Bar(100 * row.share, "extended" if row.named else ""),
+            row.removed,
+            row.probability,
         )
+        for row in ranking_rows(report)
+    ]
     return Table(("effect", "error removed", "", "probability"), rows, (2, 3))
 
 
-def limit_table(report: dict[str, Any]) -> Table:
+def ranking_note(report: dict[str, Any]) -> str:
+    """Say what the ranking shows."""
+    removed = "How much of the error each cause alone removes"
+    if report.get("verdict") == "unexplained":
+        return f"{removed}. None of them is the whole cause, so that no probability is stated."
+    return f"{removed}, and how probable it is."
+
+
+def limit_rows(report: dict[str, Any]) -> list[LimitRow]:
     """Detection limit of each effect, and the effect that is most similar to it."""
+    named = {cause["effect"] for cause in report.get("causes", [])}
     rows = []
     for row in report.get("ambiguity_map") or []:
         alike = next((one for one in row["alike"] if one["share"] >= _SIMILAR), None)
         like = f"{words(alike['effect'])} ({percent(alike['share'])})" if alike else "nothing else"
-        rows.append((words(row["effect"]), limit_phrase(row), like))
+        size = limit_phrase(row)
+        if size == NEVER and row["effect"] in named:
+            size = "the size that was found"
+        rows.append(LimitRow(effect=row["effect"], size=size, like=like))
+    return rows
+
+
+def limit_table(report: dict[str, Any]) -> Table:
+    """`limit_rows` as a table."""
+    rows = [(words(row.effect), row.size, row.like) for row in limit_rows(report)]
     return Table(("effect", "would be named from", "looks most like"), rows)
 
 
@@ -210,6 +294,17 @@ def unidentifiable_texts(report: dict[str, Any]) -> list[str]:
             text += f"; measure instead: {row['measure_instead']}"
         texts.append(text)
     return texts
+
+
+def chance(value: Any) -> str:
+    """A probability [1] as a percentage; it is never certain."""
+    if not isinstance(value, (int, float)):
+        return "–"
+    if value > 0.999:
+        return f"> 99.9{NARROW}%"
+    if value < 0.001:
+        return f"< 0.1{NARROW}%"
+    return f"{100 * value:.1f}{NARROW}%" if value > 0.99 else f"{100 * value:.0f}{NARROW}%"
 
 
 def percent(value: Any) -> str:

@@ -9,6 +9,7 @@ from palpate.app.reporting.cause_phrases import cause_phrase
 from palpate.foundation.quantities import NARROW, quantity, with_interval, words
 
 __all__ = [
+    "NEVER",
     "control_sentences",
     "determined_sentences",
     "left_sentences",
@@ -18,6 +19,10 @@ __all__ = [
     "registration_sentences",
     "verdict_sentence",
 ]
+
+NEVER = "not at any size"
+_NAMES = {"J_m": "chain limit J_m", "specific_weight_over_stiffness": "ρg/E"}
+"""Parameters whose name says little."""
 
 
 def verdict_sentence(report: dict[str, Any], size: Sequence[float] | None = None) -> str:
@@ -70,9 +75,9 @@ def limit_phrase(row: dict[str, Any]) -> str:
     factors = [limit["factor"] for limit in row["limits"] if "factor" in limit]
     shares = [limit["share"] for limit in row["limits"] if "share" in limit]
     if None in (*factors, *shares, *(limit.get("change", 0.0) for limit in row["limits"])):
-        return "not at any size"
+        return NEVER
     at = ", ".join(
-        f"{name.replace('_', ' ')} {quantity(one['value'], one['unit'])}"
+        f"{_NAMES.get(name, words(name))} {quantity(one['value'], one['unit'])}"
         for name, one in row["at"].items()
     )
     if factors and "x" not in row["at"]:
@@ -86,9 +91,9 @@ def limit_phrase(row: dict[str, Any]) -> str:
         )
         return f"{quantity(factors[0], '1')} times where it shows best, {spread}"
     if shares and row.get("effect") == "mesh_resolution":
-        return f"{quantity(shares[0], '1')} times what the replay's grid and a finer one differ by"
+        return f"{quantity(shares[0], '1')} times the change from the replay's mesh to a finer one"
     if shares:
-        return f"{quantity(100 * shares[0], '1')}{NARROW}% of what {at} does"
+        return f"{quantity(100 * shares[0], '1')}{NARROW}% of the change by {at}"
     worst: dict[str, float] = {}
     for limit in row["limits"]:
         worst[limit["unit"]] = max(limit["change"], worst.get(limit["unit"], 0.0))

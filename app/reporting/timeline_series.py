@@ -37,7 +37,8 @@ def timeline_series(run: Run, replay: RecordedReplay) -> dict[str, Any]:
 
     `depth` [m], the measured `force` [N], and by model `forces` [N] and `iterations` have one
     number for each frame; `touching` has first and last frames of the contact spells, `worst`
-    frames with contact in the order of their raw error, `failed` by model the frames without equilibrium.
+    frames with contact in the order of their raw error, `failed` by model the frames without
+    equilibrium.
     """
     depth, force = push_depth(replay), contact_force(run, replay)
     iterations, forces = by_model(replay, "iterations"), by_model(replay, "force")

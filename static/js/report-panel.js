@@ -17,8 +17,8 @@ import { stiffnessMap } from "./stiffness-map.js";
 
 /**
  * @import {
- *   AmbiguityRow, Cause, Child, ControlRow, Estimate, Gain, Palette, Palpation, Patterns,
- *   ProbeProposal, RankingEntry, Report, RunHeading
+ *   Cause, Child, ControlRow, Estimate, Gain, LimitRow, Palette, Palpation, Patterns,
+ *   ProbeProposal, RankingRow, Report, RunHeading
  * } from "./types.js"
  */
 
@@ -65,7 +65,7 @@ export function showReport(heading, report, patterns, palette) {
               ? "Causes"
               : "Cause",
           report.verdict === "replay" ? "" : "interval",
-          causes.map(causeCard),
+          causes.map((cause, number) => causeCard(cause, heading.chances?.[number])),
         )
       : null,
     report.gain
@@ -95,21 +95,17 @@ export function showReport(heading, report, patterns, palette) {
     report.stiffness_map
       ? section("Stiffness from place to place", "", stiffnessMap(heading, report))
       : null,
-    report.ranking?.length
-      ? section(
-          "Ranking",
-          "",
-          rankingTable(
-            report.ranking,
-            causes.map(({ effect }) => effect),
-          ),
-        )
+    heading.ranking?.length
+      ? section("Ranking", "", [
+          rankingTable(heading.ranking),
+          element("p", { class: "gain-note" }, heading.ranking_note ?? ""),
+        ])
       : null,
-    report.ambiguity_map?.length
+    heading.limits?.length
       ? section(
           "What this data can tell",
           "smallest that would be named",
-          detectionLimits(report.ambiguity_map),
+          detectionLimits(heading.limits),
         )
       : null,
     report.controls?.length
@@ -241,9 +237,10 @@ const section = (title, aside, ...children) =>
 
 /**
  * @param {Cause} cause
+ * @param {string} [chance] its probability as text
  * @returns {HTMLElement}
  */
-function causeCard({ effect, probability, parameters, in_file_frame: inFile }) {
+function causeCard({ effect, probability, parameters, in_file_frame: inFile }, chance) {
   const rows = Object.entries(parameters ?? {}).map(([name, entry]) => {
     const shown = formatParameter(entry);
     return element(
@@ -267,7 +264,7 @@ function causeCard({ effect, probability, parameters, in_file_frame: inFile }) {
       { class: "cause-head" },
       element("strong", {}, capitalise(readableName(effect))),
       typeof probability === "number"
-        ? element("span", {}, `probability ${formatPercent(probability)}`)
+        ? element("span", {}, `probability ${chance ?? formatPercent(probability)}`)
         : null,
     ),
     element("table", {}, element("tbody", {}, rows)),
@@ -442,11 +439,10 @@ function tunedSentence(share) {
 }
 
 /**
- * @param {RankingEntry[]} entries
- * @param {string[]} named effects that were named as causes
+ * @param {RankingRow[]} rows the named causes first
  * @returns {HTMLElement}
  */
-function rankingTable(entries, named) {
+function rankingTable(rows) {
   return element(
     "div",
     { class: "ranking" },
@@ -454,90 +450,34 @@ function rankingTable(entries, named) {
     element("span", { class: "head" }, "error removed"),
     element("span"),
     element("span", { class: "head number" }, "prob."),
-    entries
-      .slice(0, 8)
-      .flatMap(({ effect, probability, error_removed: removed }) => [
-        element("span", {}, readableName(effect)),
-        element(
-          "div",
-          { class: named.includes(effect) ? "bar first" : "bar" },
-          element("i", { style: { width: `${100 * Math.max(0, removed ?? 0)}%` } }),
-        ),
-        element("span", { class: "number" }, formatPercent(removed)),
-        element("span", { class: "number" }, formatPercent(probability)),
-      ]),
+    rows.flatMap(({ effect, share, removed, probability, named }) => [
+      element("span", {}, readableName(effect)),
+      element(
+        "div",
+        { class: named ? "bar first" : "bar" },
+        element("i", { style: { width: `${100 * share}%` } }),
+      ),
+      element("span", { class: "number" }, removed),
+      element("span", { class: "number" }, probability),
+    ]),
   );
 }
 
 /**
  * Create the list of the smallest effects that the data would show.
- * @param {AmbiguityRow[]} rows
+ * @param {LimitRow[]} rows
  * @returns {HTMLElement}
  */
 function detectionLimits(rows) {
   return element(
     "div",
     { class: "told" },
-    rows.flatMap((row) => {
-      const alike = row.alike[0];
-      const like =
-        alike && alike.share >= 0.3
-          ? `${formatPercent(alike.share)} like ${readableName(alike.effect)}`
-          : "like nothing else";
-      return [
-        element("strong", {}, capitalise(readableName(row.effect))),
-        element("span", { class: "number" }, smallestDetectable(row)),
-        element("small", {}, like),
-      ];
-    }),
+    rows.flatMap(({ effect, size, like }) => [
+      element("strong", {}, capitalise(readableName(effect))),
+      element("span", { class: "number" }, size),
+      element("small", {}, `like ${like}`),
+    ]),
   );
-}
-
-/**
- * Return the smallest size of an effect that this data would show: the worst for each unit, the
- * best place of a lump, the share of a finite cause.
- * @param {AmbiguityRow} row
- * @returns {string}
- */
-function smallestDetectable({ limits, typical, at }) {
-  const sizes = limits.map(({ change, factor, share }) => change ?? factor ?? share ?? null);
-  if (sizes.includes(null)) return "not at any size";
-  const size = sizes[0] ?? 0;
-  const where = Object.entries(at)
-    .map(([name, entry]) => `${readableName(name)} ${shortValue(entry)}`)
-    .join(", ");
-  // A factor without coordinates belongs to an effect of the whole phantom.
-  if ("factor" in limits[0] && !("x" in at))
-    return `${twoDigits(size)} times${where ? ` at ${where}` : ""}`;
-  if ("factor" in limits[0]) {
-    const half = typical.factor ? `${twoDigits(typical.factor)} times` : "not at any size";
-    return `${twoDigits(size)} times at best; half of the places ${half}`;
-  }
-  if ("share" in limits[0]) return `${formatPercent(size)} of ${where}`;
-  /** @type {Record<string, number>} */
-  const worst = {};
-  for (const { unit = "", change } of limits) worst[unit] = Math.max(change ?? 0, worst[unit] ?? 0);
-  return Object.entries(worst)
-    .map(([unit, value]) => shortValue({ value, unit }))
-    .join(", ");
-}
-
-/**
- * @param {number} value
- * @returns {number}
- */
-const twoDigits = (value) => Number(value.toPrecision(2));
-
-/**
- * Format a value with two digits and its unit.
- * @param {Estimate} entry
- * @returns {string}
- */
-function shortValue(entry) {
-  const { value, unit } = formatParameter(entry);
-  const number = Number(value);
-  const text = Number.isFinite(number) ? String(twoDigits(number)) : value;
-  return `${text}${unit && unit !== "°" ? ` ${unit}` : unit}`;
 }
 
 /**

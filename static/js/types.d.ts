@@ -63,6 +63,11 @@ export interface RunHeading extends RunEntry {
   sentence: string;
   notes?: string[];
   stiffness?: string[];
+  ranking?: RankingRow[];
+  ranking_note?: string;
+  limits?: LimitRow[];
+  /** Probabilities of the causes as texts. */
+  chances?: string[];
   size: number[];
   has_clouds: boolean;
   sequences: SequenceEntry[];
@@ -196,12 +201,10 @@ export interface DetectionLimit {
   share?: number | null;
 }
 
-export interface AmbiguityRow {
+export interface LimitRow {
   effect: string;
-  limits: DetectionLimit[];
-  typical: DetectionLimit;
-  at: Record<string, Estimate>;
-  alike: { effect: string; share: number }[];
+  size: string;
+  like: string;
 }
 
 export interface ControlRow {
@@ -239,10 +242,13 @@ export interface ErrorClues {
   measure_next: string;
 }
 
-export interface RankingEntry {
+export interface RankingRow {
   effect: string;
-  probability?: number;
-  error_removed?: number;
+  /** Of the error that it alone removes, for its bar [1]. */
+  share: number;
+  removed: string;
+  probability: string;
+  named: boolean;
 }
 
 export interface Palpation {
@@ -258,8 +264,6 @@ export interface Report {
   gain?: Gain;
   palpation?: Palpation;
   stiffness_map?: { structured: boolean };
-  ranking?: RankingEntry[];
-  ambiguity_map?: AmbiguityRow[];
   controls?: ControlRow[];
   next_probe?: ProbeProposal[];
   unexplained?: Unexplained;

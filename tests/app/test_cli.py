@@ -341,7 +341,7 @@ def test_report_is_printed_with_what_the_data_can_tell(
     print_report(report)
     shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ")
     assert "What this data can tell" in shown
-    assert "0.12 mm" in shown and "tool_offset (83 %)" in shown and "1.4 times" in shown
+    assert "0.12 mm" in shown and "tool offset (83 %)" in shown and "1.4 times" in shown
     assert "nothing else" in shown and "(20 %)" not in shown
 
 

@@ -15,6 +15,7 @@ from palpate.diagnosis.validation.negative_controls import Control, controls, wa
 
 __all__ = ["with_supplements"]
 
+_OPEN = ("ambiguous", "unexplained")
 _TOUCH_AGAIN = "touch the landmarks once more, and name each as it is touched"
 
 
@@ -45,19 +46,21 @@ def with_supplements(
         ],
         "not_identifiable": [*report["not_identifiable"], *open_rows],
         "controls": [one.to_json() for one in checked],
-        "next_probe": [
-            {
-                "kind": "measurement",
-                "separates": [findings.known[0].name, "none"],
-                "text": _TOUCH_AGAIN,
-            }
-        ]
-        if findings.known
-        else next_probe(evaluator, data, findings)
-        if evaluator.problem.clouds
-        else [],
+        "next_probe": _next_probe(report, evaluator, data, findings),
         "warnings": [*report["warnings"], *warnings_of(checked)],
     }
+
+
+def _next_probe(
+    report: dict[str, Any], evaluator: Evaluator, data: Sequence[Observations], findings: Findings
+) -> list[dict[str, Any]]:
+    """Measurements that would tell more; none where the verdict leaves nothing open."""
+    if findings.known:
+        again = {"kind": "measurement", "separates": [findings.known[0].name, "none"]}
+        return [{**again, "text": _TOUCH_AGAIN}]
+    if report["verdict"] not in _OPEN or not evaluator.problem.clouds:
+        return []
+    return next_probe(evaluator, data, findings)
 
 
 def _identified(cause: dict[str, Any], identifiability: dict[str, str]) -> dict[str, Any]:

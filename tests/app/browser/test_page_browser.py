@@ -55,12 +55,12 @@ def test_page_opens_where_naming_the_cause_changes_most_not_where_the_sensor_is_
 def test_panel_says_what_the_data_can_tell(page: Page) -> None:
     page.open()
     told = page.page.inner_text(".told").replace("\N{NO-BREAK SPACE}", " ")
-    assert "Tool radius" in told and "0.12 mm" in told and "83 % like tool offset" in told
+    assert "Tool radius" in told and "0.12 mm" in told and "like tool offset (83 %)" in told
     assert (
-        "1.4 times at best; half of the places not at any size" in told
+        "1.4 times where it shows best, at half of the places not at any size" in told
         and "like nothing else" in told
     )
-    assert "45 % of edge -x, extent 14 mm" in told
+    assert "45 % of the change by edge -x, extent 14 mm" in told
 
 
 def test_panel_says_what_the_controls_gave_and_what_to_push_next(page: Page) -> None:

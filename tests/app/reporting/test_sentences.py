@@ -173,7 +173,7 @@ def test_grid_that_is_too_coarse_is_said_with_the_edge_that_would_do() -> None:
     }
     assert (
         plain(limit_phrase({**row, "at": {}}))
-        == "1.5 times what the replay's grid and a finer one differ by"
+        == "1.5 times the change from the replay's mesh to a finer one"
     )
 
 
@@ -246,7 +246,7 @@ def test_report_on_disk_and_sentence_need_no_more_than_json(
             [{"share": 0.45}],
             {"share": 0.5},
             {"edge": {"value": "-x", "unit": ""}, "extent": {"value": 0.014, "unit": "m"}},
-            "45 % of what edge -x, extent 14 mm does",
+            "45 % of the change by edge -x, extent 14 mm",
         ),
         ([{"share": None}], {"share": None}, {}, "not at any size"),
     ],
