@@ -13,14 +13,14 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.importing.rules import ColumnRules
 from palpate.importing.sources.cloud_file import CLOUD_SUFFIXES, read_cloud_file
-from palpate.importing.sources.matlab_table import read_matlab
-from palpate.importing.sources.table_columns import proposed_columns
-from palpate.importing.sources.table_text import TextTable, read_table
 from palpate.importing.stream import Sample, Stream, StreamKind
+from palpate.importing.tables.matlab_table import read_matlab
+from palpate.importing.tables.table_columns import proposed_columns
+from palpate.importing.tables.table_rotation import row_quaternions
+from palpate.importing.tables.table_text import TextTable, read_table
 
 __all__ = ["TableSource"]
 
-_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _FORCE = ("fx", "fy", "fz")
 _NANOSECONDS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
@@ -32,21 +32,29 @@ class TableSource:
 
     Attributes:
         path: of the file.
-        warnings: found on opening.
         rules: meaning of its columns; None where nothing is recognised.
+        stated: quantities whose unit stands in the name of their column.
+        doubts: sentences on what was taken by size only, by key of `rules`.
         has_receipt: whether times of receipt are a column of their own.
     """
 
     def __init__(self, path: Path, rules: ColumnRules | None = None) -> None:
         self.path = path
-        self.warnings: list[str] = []
+        self.stated: frozenset[str] = frozenset()
+        self.doubts: dict[str, str] = {}
         self._table: TextTable = read_matlab(path) if path.suffix == ".mat" else read_table(path)
         self.rules = rules
         if rules is None:
-            self.rules, doubts = proposed_columns(self._table)
-            self.warnings.extend(doubts)
+            proposed = proposed_columns(self._table)
+            self.rules, self.stated = proposed.rules, proposed.stated
+            self.doubts = dict(proposed.doubts)
         known = self.rules.columns if self.rules is not None else {}
         self.has_receipt = "t" in known and "received" in known
+
+    @property
+    def warnings(self) -> list[str]:
+        """List the doubts about its columns."""
+        return list(self.doubts.values())
 
     @staticmethod
     def fits(path: Path) -> bool:
@@ -175,9 +183,7 @@ class TableSource:
             return np.concatenate([forces, np.zeros_like(forces)], axis=1).__getitem__
         unit = _METRES[self.rules.length_unit]
         places = unit * np.stack([self._numbers(axis) for axis in "xyz"], axis=-1)
-        turns = np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1))
-        if all(part in self.rules.columns for part in _POSE[3:]):
-            turns = np.stack([self._numbers(part) for part in _POSE[3:]], axis=-1)
+        turns = row_quaternions(self._table, self.rules)
         return np.concatenate([places, turns], axis=1).__getitem__
 
     def _cloud(self, name: str) -> Path:

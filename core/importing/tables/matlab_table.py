@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.foundation.errors import DatasetError
-from palpate.importing.sources.table_text import TextTable
+from palpate.importing.tables.table_text import TextTable
 
 __all__ = ["read_matlab"]
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from palpate.foundation.arrays import FloatArray
 from palpate.importing.rules import ColumnRules
-from palpate.importing.sources.table_text import TextTable
+from palpate.importing.tables.table_rotation import ANGLES, NAMED, ORDERED
+from palpate.importing.tables.table_text import TextTable
 
-__all__ = ["proposed_columns"]
+__all__ = ["ProposedColumns", "proposed_columns"]
 
 _UNIT = re.compile(r"[\[( _]+(ns|us|µs|ms|sec|s|mm|cm|m|mN|N|deg|rad)[\])]*$")
 _PATTERNS = {
@@ -28,6 +30,10 @@ _PATTERNS = {
     "fz": r"(f|force)z",
     "file": r"file|filename|cloud|path|cloudfile",
 }
+_NAMED_ANGLES = {("roll", "pitch", "yaw"): "euler-xyz", ("a", "b", "c"): "euler-ZYX"}
+"""Angles whose names tell what they are: fixed axes as in REP 103 of ROS, and those of a KUKA."""
+_ABOUT_AXES = r"(r|rot|rotation|theta|angle|euler|rotvec|rv)"
+_FOUR = r"(q|quat|quaternion|orientation|rot|rotation)"
 _NUMBERED = {"q0": "qw", "q1": "qx", "q2": "qy", "q3": "qz"}
 """Names of the components with the real one first; source: Kuipers 1999."""
 _HEADERLESS = {
@@ -37,30 +43,103 @@ _HEADERLESS = {
 }
 """Columns after stamp and frames in `ros2 topic echo --csv` of WrenchStamped, PoseStamped and
 TransformStamped, by the number of columns."""
+_LARGEST_RADIANS = 2 * np.pi + 0.1
+"""Largest angle that is one in radians; controllers state them within a turn."""
 _PREFIXES = re.compile(
     r"^(field|msg|data|pose|transform|wrench|header)[./_]|^/?[a-z0-9_/]+/(?=[a-z])"
 )
 
 
-def proposed_columns(table: TextTable) -> tuple[ColumnRules | None, list[str]]:
-    """Propose what the columns of a table mean.
+@dataclass(frozen=True)
+class ProposedColumns:
+    """Meaning of a table's columns as names and sizes tell it.
 
-    Returns:
-        the rules, None where neither poses, forces nor clouds are found; and sentences on what
-        was taken by size only and is to be confirmed.
+    Attributes:
+        rules: None where neither poses, forces nor clouds are found.
+        stated: quantities whose unit stands in the name of their column.
+        doubts: sentences on what was taken by size only and is to be confirmed, by key of `rules`.
     """
+
+    rules: ColumnRules | None
+    stated: frozenset[str] = frozenset()
+    doubts: dict[str, str] = field(default_factory=dict)
+
+
+def proposed_columns(table: TextTable) -> ProposedColumns:
+    """Propose what the columns of a table mean."""
     found, units = _by_name(table) if table.has_header else (_by_place(table), {})
     whole = any(set(group) <= set(found) for group in (("x", "y", "z"), ("fx", "fy", "fz")))
     if not (whole or "file" in found) or ("t" not in found and "received" not in found):
-        return None, []
-    doubts: list[str] = []
+        return ProposedColumns(None)
+    doubts: dict[str, str] = {}
+    turned = _rotation(table, found, units, doubts) if "x" in found else {}
     rules = {
         "columns": found,
         "time_unit": units.get("t") or _time_unit(table, found, doubts),
         "length_unit": units.get("x") or _length_unit(table, found, doubts),
         "force_unit": units.get("fx") or "N",
+        **turned,
     }
-    return ColumnRules.model_validate(rules), doubts
+    return ProposedColumns(ColumnRules.model_validate(rules), frozenset(units), doubts)
+
+
+def _rotation(
+    table: TextTable, found: dict[str, str], units: dict[str, str], doubts: dict[str, str]
+) -> dict[str, str]:
+    """Take up the columns of a rotation, and return rules of it; no rule where it is open."""
+    if all(part in found for part in NAMED):
+        return {}
+    for part in NAMED:
+        found.pop(part, None)
+    four = _row_of(table, _FOUR, ("1", "2", "3", "4"))
+    if four:
+        found.update(zip(ORDERED, four, strict=True))
+        doubts["quaternion_order"] = (
+            f"{table.file}: the names of {', '.join(four)} do not tell which is the real part; "
+            f'state quaternion_order = "xyzw" or "wxyz" in [tables."{table.file}"] of import.toml'
+        )
+        return {}
+    bare = {_bare(column)[0]: column for column in table.columns}
+    rotation = next((kind for names, kind in _NAMED_ANGLES.items() if set(names) <= set(bare)), "")
+    names = next((names for names, kind in _NAMED_ANGLES.items() if kind == rotation), ())
+    three = [bare[name] for name in names] or _row_of(table, _ABOUT_AXES, ("x", "y", "z"))
+    if not three:
+        return {}
+    found.update(zip(ANGLES, three, strict=True))
+    unit = _bare(three[0])[1]
+    if not rotation:
+        doubts["rotation"] = (
+            f"{table.file}: {', '.join(three)} may be angles about fixed axes, about turned ones, "
+            'or a rotation vector; state rotation = "euler-xyz", "euler-XYZ" or "rotation-vector" '
+            f'in [tables."{table.file}"] of import.toml'
+        )
+    if unit in ("deg", "rad"):
+        units["a1"] = unit
+    else:
+        unit = _angle_unit(table, three, doubts)
+    return {"rotation": rotation, "angle_unit": unit}
+
+
+def _row_of(table: TextTable, prefix: str, ends: tuple[str, ...]) -> list[str]:
+    """Columns of one prefix and these ends, in their order; none where one is missing."""
+    bare = {_bare(column)[0]: column for column in table.columns}
+    for name in bare:
+        match = re.fullmatch(prefix + re.escape(ends[0]), name)
+        if match and all(match.group(1) + end in bare for end in ends):
+            return [bare[match.group(1) + end] for end in ends]
+    return []
+
+
+def _angle_unit(table: TextTable, columns: list[str], doubts: dict[str, str]) -> str:
+    """Unit of angles without a stated one: beyond a turn they are degrees."""
+    angles: FloatArray = np.abs([table.numbers(column) for column in columns])
+    largest = float(np.nanmax(angles, initial=0.0))
+    unit = "deg" if largest > _LARGEST_RADIANS else "rad"
+    doubts["angle_unit"] = (
+        f"{table.file}: {', '.join(columns)} reach {largest:.3g}; taken as {unit}, state "
+        f'angle_unit in [tables."{table.file}"] of import.toml if they are not'
+    )
+    return unit
 
 
 def _by_name(table: TextTable) -> tuple[dict[str, str], dict[str, str]]:
@@ -117,7 +196,7 @@ def _by_place(table: TextTable) -> dict[str, str]:
     return {"t": f"{names[0]}+{names[1]}", **dict(zip(quantities, names[start:], strict=False))}
 
 
-def _time_unit(table: TextTable, found: dict[str, str], doubts: list[str]) -> str:
+def _time_unit(table: TextTable, found: dict[str, str], doubts: dict[str, str]) -> str:
     if "+" in found.get("t", ""):
         return "s+ns"
     times = table.numbers(found.get("t") or found["received"])
@@ -131,7 +210,7 @@ def _time_unit(table: TextTable, found: dict[str, str], doubts: list[str]) -> st
     if step <= 0.5:
         return "s"
     unit = "ms" if step <= 500 else "us" if step <= 5e5 else "ns"
-    doubts.append(
+    doubts["time_unit"] = (
         f"{table.file}: its times step by {step:g}; taken as {unit}, so that the stream has "
         f"{_PER_SECOND[unit] / step:.0f} Hz"
     )
@@ -141,7 +220,7 @@ def _time_unit(table: TextTable, found: dict[str, str], doubts: list[str]) -> st
 _PER_SECOND = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
-def _length_unit(table: TextTable, found: dict[str, str], doubts: list[str]) -> str:
+def _length_unit(table: TextTable, found: dict[str, str], doubts: dict[str, str]) -> str:
     if "x" not in found:
         return "m"
     places: FloatArray = np.stack([table.numbers(found[axis]) for axis in "xyz"], axis=-1)
@@ -150,7 +229,7 @@ def _length_unit(table: TextTable, found: dict[str, str], doubts: list[str]) -> 
     if span <= 1.0:
         return "m"
     unit = "mm"
-    doubts.append(
+    doubts["length_unit"] = (
         f"{table.file}: its positions span {span:.3g}; taken as {unit}, a path of {span:.0f} mm"
     )
     return unit
