@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from palpate.importing.import_notes import ImportNotes
     from palpate.importing.recording import Recording
     from palpate.importing.rules import ImportMapping
+    from palpate.importing.tables.table_preview import TablePreview
 
 __all__ = ["import_"]
 
@@ -110,7 +111,11 @@ def _proposed(
                 found.topics[role] = stream
         for recording in found.recordings:
             _print_streams(recording)
-        return found.proposal(to.name if to is not None else "imported", notes)
+        proposal = found.proposal(to.name if to is not None else "imported", notes)
+        for recording in found.recordings:
+            for preview in recording.previews():
+                _print_preview(preview)
+        return proposal
     finally:
         found.close()
 
@@ -147,6 +152,24 @@ def _print_streams(recording: Recording) -> None:
                     "another clock, or a time that was never set"
                 ]
             )
+
+
+def _print_preview(preview: TablePreview) -> None:
+    """Print the first rows of a table in SI units, below the names of its columns."""
+    table = Table(
+        title=escape(f"{preview.file}: first of {preview.rows} rows, as they are understood"),
+        header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False,
+    )  # fmt: skip
+    for name in ("quantity", "column", "written in", "first rows"):
+        table.add_column(name, overflow="fold")
+    for one in preview.columns:
+        unit = f" [{one.unit}]" if one.unit else ""
+        row = (f"{one.quantity}{unit}", one.column, one.written or "–", ", ".join(one.values))
+        table.add_row(*(escape(cell) for cell in row))
+    out.print(table)
+    if preview.unused:
+        names = escape(", ".join(preview.unused)[:200])
+        out.print(f"not used: {names}", highlight=False)
 
 
 def _delay(seconds: float | None) -> str:

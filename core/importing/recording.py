@@ -14,7 +14,9 @@ from palpate.foundation.progress import Report, silent
 from palpate.importing.clocks.track import Track
 from palpate.importing.rules import ColumnRules
 from palpate.importing.sources.opened_sources import open_source
+from palpate.importing.sources.table_source import TableSource
 from palpate.importing.stream import Sample, Source, Stream
+from palpate.importing.tables.table_preview import TablePreview
 
 __all__ = ["Recording", "opened_recording"]
 
@@ -77,6 +79,22 @@ class Recording:
     def warnings(self) -> list[str]:
         """List the warnings of all sources."""
         return [warning for source in self.sources for warning in source.warnings]
+
+    def previews(self, rows: int = 3) -> tuple[TablePreview, ...]:
+        """First rows of its tables as they are understood."""
+        tables = (one for one in self.sources if isinstance(one, TableSource))
+        return tuple(found for one in tables if (found := one.preview(rows)) is not None)
+
+    def sure_seconds(self, without: Source) -> tuple[float, ...]:
+        """Durations [s] of the streams of other sources, but for tables with a doubtful unit."""
+        return tuple(
+            stream.seconds
+            for source in self.sources
+            if source is not without
+            and not (isinstance(source, TableSource) and "time_unit" in source.doubts)
+            for stream in source.streams()
+            if stream.count > 1 and stream.seconds > 0
+        )
 
     def close(self) -> None:
         """Close all sources."""

@@ -13,9 +13,12 @@ from palpate.importing.import_notes import ImportNotes
 from palpate.importing.proposed_mapping import proposed_mapping, recording_name
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ColumnRules, ImportMapping, RestRules
+from palpate.importing.sources.agreed_rules import agree_rules
 from palpate.importing.sources.opened_sources import is_source, open_source
+from palpate.importing.sources.table_source import TableSource
 from palpate.importing.stated_setup import SETUP_TABLES
 from palpate.importing.stream import Source
+from palpate.importing.tables.table_evidence import TableEvidence
 
 __all__ = ["Survey", "survey"]
 
@@ -57,6 +60,7 @@ class Survey:
     def proposal(self, name: str, notes: ImportNotes) -> ImportMapping:
         """Propose a mapping; DatasetError where no stream is the pose of a tool."""
         tables: dict[str, ColumnRules] = {}
+        self._agree(notes)
         for recording in self.recordings:
             for source in recording.sources:
                 if source.rules is not None:
@@ -74,6 +78,16 @@ class Survey:
                 "setup_folder": self.setup_folder,
             }
         )
+
+    def _agree(self, notes: ImportNotes) -> None:
+        """Settle units and rotations of tables by what is stated beside them."""
+        for recording in self.recordings:
+            tables = [one for one in recording.sources if isinstance(one, TableSource)]
+            for table in tables:
+                evidence = TableEvidence.of(
+                    self.setup, self.touches, recording.sure_seconds(without=table)
+                )
+                agree_rules(table, evidence, notes)
 
 
 def survey(paths: Sequence[Path], setup: Path | None) -> Survey:

@@ -30,7 +30,7 @@ def open_source(path: Path, rules: ColumnRules | None = None) -> Source:
     """
     from palpate.importing.sources.bag_source import BagSource
     from palpate.importing.sources.cloud_folder_source import CloudFolderSource
-    from palpate.importing.tables.table_source import TableSource
+    from palpate.importing.sources.table_source import TableSource
 
     if not path.exists():
         raise DatasetError(f"{path} does not exist; expected a recording", file=str(path))

@@ -14,7 +14,7 @@ from small_dataset import ply_bytes
 from palpate.foundation.errors import DatasetError
 from palpate.importing.sources.cloud_file import read_cloud_file
 from palpate.importing.sources.cloud_folder_source import CloudFolderSource
-from palpate.importing.tables.table_source import TableSource
+from palpate.importing.sources.table_source import TableSource
 
 POINTS = np.random.default_rng(5).normal(size=(50, 3)) * 0.1
 

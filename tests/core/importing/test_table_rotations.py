@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from palpate.foundation.errors import DatasetError
 from palpate.importing.rules import ColumnRules
-from palpate.importing.tables.table_source import TableSource
+from palpate.importing.sources.table_source import TableSource
 
 TURNS = Rotation.from_euler("xyz", np.linspace([2.9, -0.2, 0.1], [3.4, 0.3, 0.9], 30))
 PLACES = np.linspace([0.1, 0.0, 0.2], [0.12, 0.01, 0.15], 30)

@@ -10,7 +10,7 @@ from scipy.io import savemat
 
 from palpate.foundation.errors import DatasetError
 from palpate.importing.rules import ColumnRules
-from palpate.importing.tables.table_source import TableSource
+from palpate.importing.sources.table_source import TableSource
 from palpate.importing.stream import Source
 
 TIMES = 1_700_000_000_123_456_789 + np.arange(40) * 10_000_000
