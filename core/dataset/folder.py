@@ -140,7 +140,9 @@ def open_dataset(path: Path | str) -> Dataset:
     check_folder(root)
     config, geometry = stated(root)
     touches, traces = read_touches(root, config), read_traces(root)
-    sequences = tuple(read_sequence(root, name) for name in sequence_names(root))
+    sequences = tuple(
+        read_sequence(root, name, config.force_sigma) for name in sequence_names(root)
+    )
     check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
     if observed and not config.has_camera:

@@ -56,6 +56,8 @@ class DatasetConfig:
         camera_filters: names of the filters on its images.
         edge: width of the band along the phantom's edges in which depth is rounded [m]; the widest
             of the filters' if not stated.
+        force_sigma: standard deviation of one component of a force from the true one, beside the
+            sensor's noise and bias [N]; 0 if not stated.
         train: names of sequences for the fit.
         validation: names of sequences for validation.
         test: names of sequences for the test.
@@ -85,6 +87,7 @@ class DatasetConfig:
     test: tuple[str, ...]
     height_sigma: float | None = None
     phantom_from_robot: StatedPose | None = None
+    force_sigma: float = 0.0
     phantom_from_file: Transform = field(default_factory=Transform)
 
     def in_phantom_frame(self, size: Vector, phantom_from_file: Transform) -> DatasetConfig:
@@ -114,7 +117,10 @@ def read_config(root: Path) -> DatasetConfig:
     """
     top = Keys("", read_toml(root, FILE, _LIMIT))
     top.only(
-        ("format", "name", "phantom", "tool", "landmarks", "robot", "camera", "splits", "topics")
+        (
+            *("format", "name", "phantom", "tool", "landmarks", "robot", "camera", "force"),
+            *("splits", "topics"),
+        )
     )
     if (version := top.take("format")) != 1 or isinstance(version, bool):
         raise top.wrong("format", version, "1, the only version there is: convert the dataset")
@@ -131,6 +137,7 @@ def read_config(root: Path) -> DatasetConfig:
         **_landmarks(top.table("landmarks") if "landmarks" in top.values else Keys("", {})),
         phantom_from_robot=_robot(top.table("robot")) if "robot" in top.values else None,
         **_camera(top.table("camera") if "camera" in top.values else None),
+        force_sigma=_force(top.table("force")) if "force" in top.values else 0.0,
         **_splits(top.table("splits")),
     )
 
@@ -197,6 +204,11 @@ def _landmarks(keys: Keys) -> dict[str, Any]:
 def _sigma(keys: Keys, name: str) -> float | None:
     """An optional standard deviation of a length [m]."""
     return keys.number(name, 1e-6, 0.05, "m") if name in keys.values else None
+
+
+def _force(keys: Keys) -> float:
+    keys.only(("sigma",))
+    return keys.number("sigma", 0.0, 100.0, "N", default=0.0)
 
 
 def _robot(keys: Keys) -> StatedPose | None:

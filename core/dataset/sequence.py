@@ -71,10 +71,13 @@ class Forces:
     Attributes:
         time: (n,) [s].
         force: (n, 3) [N].
+        sigma: stated standard deviation of one component from the true force, beside noise and
+            bias [N].
     """
 
     time: FloatArray
     force: FloatArray
+    sigma: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +129,14 @@ class Sequence:
         )
 
 
-def read_sequence(root: Path, name: str) -> Sequence:
-    """Read and check a sequence, without the points of its clouds."""
+def read_sequence(root: Path, name: str, force_sigma: float = 0.0) -> Sequence:
+    """Read and check a sequence, without the points of its clouds.
+
+    Args:
+        root: of the dataset.
+        name: of the sequence.
+        force_sigma: stated standard deviation of a force [N].
+    """
     home = f"sequences/{name}"
     kinematics = read_kinematics(root, f"{home}/kinematics.csv")
     times, files = np.empty(0), tuple[str, ...]()
@@ -140,8 +149,9 @@ def read_sequence(root: Path, name: str) -> Sequence:
             home,
             "has neither clouds.csv nor forces.csv; expected at least one: add what was measured",
         )
-    felt = read_forces(root, forces) if has_forces else None
-    if felt is not None:
+    felt = None
+    if has_forces:
+        felt = replace(read_forces(root, forces), sigma=force_sigma)
         _check_overlap(forces, felt.time, kinematics.time)
     return Sequence(root, name, kinematics, times, files, felt)
 

@@ -121,7 +121,8 @@ class ColumnRules(_Rules):
         columns: column by quantity: t, received, x, y, z, qx, qy, qz, qw, fx, fy, fz, file; q1 to
             q4 for a quaternion by `quaternion_order`; a1 to a3 for the angles of `rotation` in
             its order, or the components of a rotation vector. A column without a name is called
-            by its number, the first is "1".
+            by its number, the first is "1". In tables of depth steps also nx, ny, nz for the
+            outward normal and push for the number of the push.
         time_unit: of t.
         length_unit: of x, y, z.
         force_unit: of fx, fy, fz.
@@ -206,7 +207,7 @@ class ImportMapping(_Rules):
         rest: where the rest cloud comes from.
         touches: file of touches; empty to find them as dwells.
         traces: file of traces; empty for none.
-        setup: tables of dataset.toml: phantom, tool, landmarks, robot, camera, splits.
+        setup: tables of dataset.toml: phantom, tool, landmarks, robot, camera, force, splits.
         setup_folder: folder of the files that `setup` names.
     """
 

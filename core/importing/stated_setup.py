@@ -20,10 +20,13 @@ from palpate.importing.timed_recording import TimedRecording
 from palpate.importing.written_dataset import DatasetWriter
 from palpate.registration.robot.robot_statements import robot_fits, touched_centres
 
-__all__ = ["SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
+__all__ = ["ESTIMATED_SIGMA", "SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
 
-SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "splits")
+SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "force", "splits")
 """Tables of dataset.toml that an import takes over."""
+ESTIMATED_SIGMA = 2.0
+"""Standard deviation of forces that are estimated from motor currents [N]; public work on the dVRK
+finds about 2 N RMS."""
 _SURFACES = ("surface", "fixed_surface", "holder")
 
 
@@ -51,6 +54,8 @@ def write_setup(
 ) -> None:
     """Write dataset.toml and copy the files that it names, touches and traces."""
     values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup, "splits": splits}
+    if mapping.wrench.estimated and mapping.streams.wrench:
+        values["force"] = {"sigma": ESTIMATED_SIGMA, **mapping.setup.get("force", {})}
     writer.text("dataset.toml", toml_text(values))
     home = base / mapping.setup_folder
     for key in _SURFACES:
