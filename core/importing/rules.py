@@ -207,7 +207,8 @@ class ImportMapping(_Rules):
         rest: where the rest cloud comes from.
         touches: file of touches; empty to find them as dwells.
         traces: file of traces; empty for none.
-        setup: tables of dataset.toml: phantom, tool, landmarks, robot, camera, force, splits.
+        setup: tables of dataset.toml: phantom, tool, landmarks, robot, camera, force, motion,
+            splits.
         setup_folder: folder of the files that `setup` names.
     """
 

@@ -22,7 +22,7 @@ from palpate.registration.robot.robot_statements import robot_fits, touched_cent
 
 __all__ = ["ESTIMATED_SIGMA", "SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
 
-SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "force", "splits")
+SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "force", "motion", "splits")
 """Tables of dataset.toml that an import takes over."""
 ESTIMATED_SIGMA = 2.0
 """Standard deviation of forces that are estimated from motor currents [N]; public work on the dVRK
