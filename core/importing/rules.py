@@ -121,8 +121,7 @@ class ColumnRules(_Rules):
         columns: column by quantity: t, received, x, y, z, qx, qy, qz, qw, fx, fy, fz, file; q1 to
             q4 for a quaternion by `quaternion_order`; a1 to a3 for the angles of `rotation` in
             its order, or the components of a rotation vector. A column without a name is called
-            by its number, the first is "1". In tables of depth steps also nx, ny, nz for the
-            outward normal and push for the number of the push.
+            by its number, the first is "1".
         time_unit: of t.
         length_unit: of x, y, z.
         force_unit: of fx, fy, fz.
@@ -131,6 +130,8 @@ class ColumnRules(_Rules):
             has it. Roll, pitch and yaw are "euler-xyz"; A, B and C of a KUKA "euler-ZYX".
         angle_unit: of a1, a2, a3.
         quaternion_order: of q1 to q4, "xyzw" or "wxyz"; empty where it is not known.
+        rows: "stream", or "depth-steps" where each row is a step of a push at rest, whose time
+            does not matter; nx, ny, nz are then the outward normal, push tells one from another.
     """
 
     columns: dict[str, str]
@@ -140,6 +141,7 @@ class ColumnRules(_Rules):
     rotation: Annotated[str, Field(pattern=_ROTATION)] = "quaternion"
     angle_unit: Literal["rad", "deg"] = "rad"
     quaternion_order: Literal["", "xyzw", "wxyz"] = ""
+    rows: Literal["stream", "depth-steps"] = "stream"
 
 
 class CutRules(_Rules):

@@ -56,6 +56,8 @@ def write_setup(
     values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup, "splits": splits}
     if mapping.wrench.estimated and mapping.streams.wrench:
         values["force"] = {"sigma": ESTIMATED_SIGMA, **mapping.setup.get("force", {})}
+    if any(rules.rows == "depth-steps" for rules in mapping.tables.values()):
+        values["motion"] = {"stamps": "synthetic", **mapping.setup.get("motion", {})}
     writer.text("dataset.toml", toml_text(values))
     home = base / mapping.setup_folder
     for key in _SURFACES:
@@ -80,7 +82,9 @@ def found_phantom(
     traces = read_traces(root)
     has_touches = (root / "touches.csv").exists()
     dataset = Dataset(root, config, none, False, (), geometry, traces)
-    if not has_touches and not len(traces) and config.phantom_from_robot is None:
+    # Depth steps at rest would be taken for dwells at landmarks.
+    dwells = not config.synthetic_stamps
+    if dwells and not has_touches and not len(traces) and config.phantom_from_robot is None:
         _find_touches(writer, dataset, recordings, notes)
         has_touches = (root / "touches.csv").exists()
     touches = read_touches(root, config) if has_touches else none

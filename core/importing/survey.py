@@ -9,6 +9,7 @@ from typing import Any
 
 from palpate.dataset.files import read_toml
 from palpate.foundation.errors import DatasetError
+from palpate.importing.cutting.probing_sequences import with_probing
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.proposed_mapping import proposed_mapping, recording_name
 from palpate.importing.recording import Recording
@@ -70,6 +71,7 @@ class Survey:
         mapping = proposed_mapping(
             self.recordings, self.name or name, self.setup, tables, self.topics, notes
         )
+        mapping = with_probing(mapping, self.recordings, notes)
         return mapping.model_copy(
             update={
                 "touches": self.touches,

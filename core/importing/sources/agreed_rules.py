@@ -71,7 +71,9 @@ def _agree_times(source: TableSource, evidence: TableEvidence, notes: ImportNote
     assert rules is not None
     if "t" in source.stated or rules.time_unit == "s+ns" or not evidence.seconds:
         return
-    column = rules.columns.get("t") or rules.columns["received"]
+    column = rules.columns.get("t") or rules.columns.get("received")
+    if column is None or rules.rows == "depth-steps":
+        return
     times = source.table.numbers(column)
     if float(np.nanmin(times)) > 1e8:  # since 1970: its size tells the unit
         return
@@ -93,7 +95,7 @@ def _agree_lengths(source: TableSource, evidence: TableEvidence, notes: ImportNo
     if "x" in source.stated or evidence.size is None:
         return
     path = np.stack([source.table.numbers(rules.columns[axis]) for axis in "xyz"], axis=-1)
-    path = path[np.isfinite(path).all(axis=1)]
+    path = path[np.isfinite(path).all(axis=1) & (path != 0).any(axis=1)]
     if len(path) < 2:
         return
     if len(evidence.touches):

@@ -30,6 +30,7 @@ def open_source(path: Path, rules: ColumnRules | None = None) -> Source:
     """
     from palpate.importing.sources.bag_source import BagSource
     from palpate.importing.sources.cloud_folder_source import CloudFolderSource
+    from palpate.importing.sources.probing_source import ProbingSource
     from palpate.importing.sources.table_source import TableSource
 
     if not path.exists():
@@ -39,7 +40,10 @@ def open_source(path: Path, rules: ColumnRules | None = None) -> Source:
     if CloudFolderSource.fits(path):
         return CloudFolderSource(path)
     if TableSource.fits(path):
-        return TableSource(path, rules)
+        table = TableSource(path, rules)
+        if table.rules is not None and table.rules.rows == "depth-steps":
+            return ProbingSource.of(table)
+        return table
     raise DatasetError(
         f"{path.name} is no recording that is known; expected .bag, .db3, .mcap, a folder with "
         "metadata.yaml, a table (.csv, .tsv, .txt, .mat), or a folder of clouds named by stamps",

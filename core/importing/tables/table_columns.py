@@ -28,6 +28,10 @@ _PATTERNS = {
     "fx": r"(f|force)x",
     "fy": r"(f|force)y",
     "fz": r"(f|force)z",
+    "nx": r"(n|normal|norm|surfacenormal)x",
+    "ny": r"(n|normal|norm|surfacenormal)y",
+    "nz": r"(n|normal|norm|surfacenormal)z",
+    "push": r"(push|poke|probe|probing|contact|point|site)(id|number|no|nr|index)?",
     "file": r"file|filename|cloud|path|cloudfile",
 }
 _NAMED_ANGLES = {("roll", "pitch", "yaw"): "euler-xyz", ("a", "b", "c"): "euler-ZYX"}
@@ -45,6 +49,10 @@ _HEADERLESS = {
 TransformStamped, by the number of columns."""
 _LARGEST_RADIANS = 2 * np.pi + 0.1
 """Largest angle that is one in radians; controllers state them within a turn."""
+_SLOW, _SLOWEST = 0.5, 5.0
+"""Step from which rows are depth steps [s], and from which it may be milliseconds of a stream."""
+_REPEATS = 0.05
+"""Share of stamps that do not increase above which they are no times [1]."""
 _PREFIXES = re.compile(
     r"^(field|msg|data|pose|transform|wrench|header)[./_]|^/?[a-z0-9_/]+/(?=[a-z])"
 )
@@ -69,18 +77,36 @@ def proposed_columns(table: TextTable) -> ProposedColumns:
     """Propose what the columns of a table mean."""
     found, units = _by_name(table) if table.has_header else (_by_place(table), {})
     whole = any(set(group) <= set(found) for group in (("x", "y", "z"), ("fx", "fy", "fz")))
-    if not (whole or "file" in found) or ("t" not in found and "received" not in found):
+    at_rest = _is_at_rest(table, found)
+    timed = "t" in found or "received" in found
+    if not (whole or "file" in found) or not (timed or at_rest):
         return ProposedColumns(None)
     doubts: dict[str, str] = {}
     turned = _rotation(table, found, units, doubts) if "x" in found else {}
     rules = {
         "columns": found,
-        "time_unit": units.get("t") or _time_unit(table, found, doubts),
+        "rows": "depth-steps" if at_rest else "stream",
+        "time_unit": "s" if at_rest else units.get("t") or _time_unit(table, found, doubts),
         "length_unit": units.get("x") or _length_unit(table, found, doubts),
         "force_unit": units.get("fx") or "N",
         **turned,
     }
     return ProposedColumns(ColumnRules.model_validate(rules), frozenset(units), doubts)
+
+
+def _is_at_rest(table: TextTable, found: dict[str, str]) -> bool:
+    """Whether rows are depth steps at rest: each has a place and a force, and a push or a normal
+    or no time; where they have times these do not increase, or step slowly.
+    """
+    if not {"x", "y", "z", "fx", "fy", "fz"} <= set(found) or "received" in found:
+        return False
+    if "t" not in found:
+        return True
+    if "push" not in found and not {"nx", "ny", "nz"} <= set(found):
+        return False
+    steps = np.diff(table.numbers(found["t"].split("+")[0]))
+    # Quicker than that the rows are a stream, in whatever unit.
+    return bool((steps <= 0).mean() > _REPEATS or _SLOW < np.median(steps) < _SLOWEST)
 
 
 def _rotation(
