@@ -53,6 +53,9 @@ def import_(
     pose: Annotated[str, typer.Option(help="Stream of the tool's poses.")] = "",
     cloud: Annotated[str, typer.Option(help="Stream of clouds or depth images.")] = "",
     wrench: Annotated[str, typer.Option(help="Stream of forces.")] = "",
+    preset: Annotated[
+        str, typer.Option(help="Layout of the recordings; by their look unless named, or none.")
+    ] = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print streams and mapping, write no dataset.")
     ] = False,
@@ -70,7 +73,7 @@ def import_(
 
     notes = ImportNotes()
     if mapping is not None and mapping.exists():
-        if files or setup or pose or cloud or wrench:
+        if files or setup or pose or cloud or wrench or preset:
             raise DatasetError(
                 f"{mapping} states the recordings already; expected it alone: leave out the files "
                 "and options, or name another mapping",
@@ -78,7 +81,8 @@ def import_(
             )
         chosen, base = read_mapping(mapping), mapping.resolve().parent
     else:
-        chosen, base = _proposed(files or [], to, setup, (pose, cloud, wrench), notes), Path.cwd()
+        named = pose, cloud, wrench
+        chosen, base = _proposed(files or [], to, setup, named, preset, notes), Path.cwd()
         _write_proposal(mapping, chosen)
     if to is None or dry_run:
         _print_notes(notes)
@@ -98,13 +102,14 @@ def _proposed(
     to: Path | None,
     setup: Path | None,
     named: tuple[str, str, str],
+    preset: str,
     notes: ImportNotes,
 ) -> ImportMapping:
     from palpate.importing.survey import survey
 
     if not files:
         raise DatasetError("no file is named; expected recordings, or --mapping import.toml")
-    found = survey(files, setup)
+    found = survey(files, setup, preset)
     try:
         for role, stream in zip(("pose", "cloud", "wrench"), named, strict=True):
             if stream:

@@ -40,7 +40,9 @@ def with_probing(
             f"{source.path.name}: its pushes are spread over {len(source.windows(name, prefix))} "
             "sequences, neighbours in different ones"
         )
+    notes.decisions[:] = [one for one in notes.decisions if not one.startswith("one recording:")]
     changed: dict[str, object] = {
+        "cutting": mapping.cutting.model_copy(update={"cut": False}),
         "sequences": tuple(windows),
         "setup": {"splits": splits, **mapping.setup},
     }

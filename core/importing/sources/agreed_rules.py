@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from palpate.foundation.arrays import FloatArray
+from palpate.foundation.errors import DatasetError
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.rules import ColumnRules
 from palpate.importing.sources.table_source import TableSource
@@ -55,6 +56,10 @@ def agree_rules(source: TableSource, evidence: TableEvidence, notes: ImportNotes
     if all(axis in source.rules.columns for axis in "xyz"):
         _agree_lengths(source, evidence, notes)
         _agree_rotation(source, evidence, notes)
+        try:
+            row_quaternions(source.table.head(1), source.rules)
+        except DatasetError as error:
+            source.doubts.setdefault(str(error.where["key"]).rpartition(".")[2], error.message)
 
 
 def _settled(source: TableSource, notes: ImportNotes, text: str, **changed: str) -> None:

@@ -12,7 +12,7 @@ from palpate.foundation.errors import DatasetError
 from palpate.importing.clocks.track import Stamps
 from palpate.importing.rules import SequenceWindow
 from palpate.importing.sources.table_source import TableSource
-from palpate.importing.stream import Sample, Stream
+from palpate.importing.stream import Sample, Stream, StreamKind
 from palpate.importing.tables.depth_steps import DepthPush, MadeUpTimes, made_up_times, read_pushes
 
 __all__ = ["ProbingSource"]
@@ -55,6 +55,10 @@ class ProbingSource(TableSource):
     def streams(self) -> tuple[Stream, ...]:
         """List the pose and the forces."""
         line = self._line()
+        kinds: tuple[tuple[StreamKind, Stamps], ...] = (
+            ("pose", line.pose_times),
+            ("wrench", line.force_times),
+        )
         return tuple(
             Stream(
                 name=f"{self.path.name}#{kind}",
@@ -63,7 +67,7 @@ class ProbingSource(TableSource):
                 count=len(times),
                 seconds=float(times[-1] - times[0]) / 1e9,
             )
-            for kind, times in (("pose", line.pose_times), ("wrench", line.force_times))
+            for kind, times in kinds
         )
 
     def samples(self, names: Collection[str]) -> Iterator[Sample]:

@@ -79,6 +79,7 @@ def _columns(head: TextTable, rules: ColumnRules) -> Iterator[PreviewColumn]:
         )
     for axes, written, unit, factor in (
         ("x y z", rules.length_unit, "m", METRES[rules.length_unit]),
+        ("nx ny nz", "", "", 1.0),
         ("fx fy fz", rules.force_unit, "N", NEWTONS[rules.force_unit]),
     ):
         for axis in axes.split():
@@ -91,14 +92,15 @@ def _columns(head: TextTable, rules: ColumnRules) -> Iterator[PreviewColumn]:
                     values=tuple(f"{factor * one:.6g}" for one in head.numbers(known[axis])),
                 )
     yield from _rotation(head, rules)
-    if "file" in known:
-        yield PreviewColumn(
-            quantity="file",
-            column=known["file"],
-            written="",
-            unit="",
-            values=tuple(head.texts(known["file"])),
-        )
+    for name in ("push", "file"):
+        if name in known:
+            yield PreviewColumn(
+                quantity=name,
+                column=known[name],
+                written="",
+                unit="",
+                values=tuple(head.texts(known[name])),
+            )
 
 
 def _rotation(head: TextTable, rules: ColumnRules) -> Iterator[PreviewColumn]:
