@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from palpate.importing.import_notes import ImportNotes
     from palpate.importing.recording import Recording
     from palpate.importing.rules import ImportMapping
+    from palpate.importing.tables.table_preview import TablePreview
 
 __all__ = ["import_"]
 
@@ -52,6 +53,9 @@ def import_(
     pose: Annotated[str, typer.Option(help="Stream of the tool's poses.")] = "",
     cloud: Annotated[str, typer.Option(help="Stream of clouds or depth images.")] = "",
     wrench: Annotated[str, typer.Option(help="Stream of forces.")] = "",
+    preset: Annotated[
+        str, typer.Option(help="Layout of the recordings; by their look unless named, or none.")
+    ] = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print streams and mapping, write no dataset.")
     ] = False,
@@ -69,7 +73,7 @@ def import_(
 
     notes = ImportNotes()
     if mapping is not None and mapping.exists():
-        if files or setup or pose or cloud or wrench:
+        if files or setup or pose or cloud or wrench or preset:
             raise DatasetError(
                 f"{mapping} states the recordings already; expected it alone: leave out the files "
                 "and options, or name another mapping",
@@ -77,7 +81,8 @@ def import_(
             )
         chosen, base = read_mapping(mapping), mapping.resolve().parent
     else:
-        chosen, base = _proposed(files or [], to, setup, (pose, cloud, wrench), notes), Path.cwd()
+        named = pose, cloud, wrench
+        chosen, base = _proposed(files or [], to, setup, named, preset, notes), Path.cwd()
         _write_proposal(mapping, chosen)
     if to is None or dry_run:
         _print_notes(notes)
@@ -97,20 +102,25 @@ def _proposed(
     to: Path | None,
     setup: Path | None,
     named: tuple[str, str, str],
+    preset: str,
     notes: ImportNotes,
 ) -> ImportMapping:
     from palpate.importing.survey import survey
 
     if not files:
         raise DatasetError("no file is named; expected recordings, or --mapping import.toml")
-    found = survey(files, setup)
+    found = survey(files, setup, preset)
     try:
         for role, stream in zip(("pose", "cloud", "wrench"), named, strict=True):
             if stream:
                 found.topics[role] = stream
         for recording in found.recordings:
             _print_streams(recording)
-        return found.proposal(to.name if to is not None else "imported", notes)
+        proposal = found.proposal(to.name if to is not None else "imported", notes)
+        for recording in found.recordings:
+            for preview in recording.previews():
+                _print_preview(preview)
+        return proposal
     finally:
         found.close()
 
@@ -147,6 +157,24 @@ def _print_streams(recording: Recording) -> None:
                     "another clock, or a time that was never set"
                 ]
             )
+
+
+def _print_preview(preview: TablePreview) -> None:
+    """Print the first rows of a table in SI units, below the names of its columns."""
+    table = Table(
+        title=escape(f"{preview.file}: first of {preview.rows} rows, as they are understood"),
+        header_style="bold", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False,
+    )  # fmt: skip
+    for name in ("quantity", "column", "written in", "first rows"):
+        table.add_column(name, overflow="fold")
+    for one in preview.columns:
+        unit = f" [{one.unit}]" if one.unit else ""
+        row = (f"{one.quantity}{unit}", one.column, one.written or "–", ", ".join(one.values))
+        table.add_row(*(escape(cell) for cell in row))
+    out.print(table)
+    if preview.unused:
+        names = escape(", ".join(preview.unused)[:200])
+        out.print(f"not used: {names}", highlight=False)
 
 
 def _delay(seconds: float | None) -> str:

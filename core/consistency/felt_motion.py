@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from palpate.consistency.contact_timeline import ContactTimeline
 from palpate.dataset import Dataset, Sequence
 from palpate.dataset.tool_smoothing import averaged
-from palpate.foundation.arrays import FloatArray, IntArray
+from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.foundation.frames import Transform
 
 __all__ = ["FeltMotion", "Reading", "readings"]
@@ -29,6 +29,8 @@ _LEAST_PUSHED = 0.6
 """Least share of the push that a shift must leave in the common time [1]."""
 _CLEAR = 2e-3
 """Gap from which the sensor reads its bias alone [m]."""
+_PAUSE = 1.0
+"""Time without a force from which none is known [s]."""
 _PRESSED = 5e-4
 """Depth from which a push counts [m]: the accuracy of touches."""
 
@@ -40,8 +42,8 @@ class FeltMotion:
     Attributes:
         name: of the sequence.
         timeline: of the tool, phantom frame.
-        force: (n, 3) [N], robot frame, without the mean of the clear stretches; NaN beyond the
-            stream.
+        force: (n, 3) [N], robot frame, without the mean of the clear stretches, or without a
+            constant of each push where there are none; NaN beyond the stream and in its pauses.
         turn: (n, 3, 3) robot frame from the tool's frame.
         to_phantom: (3, 3) phantom frame from the robot frame.
     """
@@ -62,9 +64,13 @@ class FeltMotion:
             return None
         timeline = ContactTimeline.of(dataset, sequence, phantom_from_robot)
         known = (timeline.time >= stream.time[0]) & (timeline.time <= stream.time[-1])
+        known &= _is_near(stream.time, timeline.time)
         force = np.where(known[:, None], averaged(stream.time, stream.force, timeline.time), np.nan)
         clear = known & (timeline.gap > _CLEAR)
-        force = force - (force[clear].mean(axis=0) if clear.sum() > 4 else 0.0)
+        if clear.sum() > 4:
+            force = force - force[clear].mean(axis=0)
+        else:
+            force = force - _constants(timeline, force)
         rows = np.clip(np.searchsorted(clock.time, timeline.time), 0, len(clock.time) - 1)
         turn = Rotation.from_quat(clock.quaternion[rows]).as_matrix()
         return cls(sequence.name, timeline, force, turn, phantom_from_robot.rotation)
@@ -135,6 +141,26 @@ class FeltMotion:
         push = self.timeline.depth[rows] ** 1.5
         slope = float(np.linalg.norm(self.force[rows], axis=1) @ push / max(push @ push, 1e-30))
         return float(0.75 * slope * (1 - poisson_ratio**2) / np.sqrt(radius))
+
+
+def _is_near(stamps: FloatArray, times: FloatArray) -> BoolArray:
+    """Whether times (n,) [s] lie between two stamps that are no pause apart."""
+    steps = np.diff(stamps, append=stamps[-1])
+    row = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 1)
+    return np.asarray(steps[row] <= max(_PAUSE, 3 * float(np.median(steps))))
+
+
+def _constants(timeline: ContactTimeline, force: FloatArray) -> FloatArray:
+    """Constants (n, 3) [N] of the pushes, by the force's course with depth to the power of 1.5."""
+    found = np.zeros_like(force)
+    usable = (timeline.depth > 0) & np.isfinite(force[:, 0])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], usable.astype(int), [0]])))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        course = timeline.depth[start:stop] ** 1.5
+        if stop - start > 3 and np.ptp(timeline.depth[start:stop]) > _PRESSED:
+            rows = np.stack([np.ones(stop - start), course / course.max()], axis=-1)
+            found[start:stop] = np.linalg.lstsq(rows, force[start:stop], rcond=None)[0][0]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -87,7 +87,8 @@ def find_problems(root: Path, report: Report = silent) -> list[PalpateError]:
 def _sequence(root: Path, name: str, config: DatasetConfig | None, seen: _Found) -> None:
     home = f"sequences/{name}"
     seen.all(row_problems(root, f"{home}/kinematics.csv", KINEMATICS))
-    kinematics = seen.of(lambda: read_kinematics(root, f"{home}/kinematics.csv"))
+    at_rest = config is not None and config.synthetic_stamps
+    kinematics = seen.of(lambda: read_kinematics(root, f"{home}/kinematics.csv", at_rest))
     forces, clouds = f"{home}/forces.csv", f"{home}/clouds.csv"
     if (root / forces).exists():
         seen.all(row_problems(root, forces, FORCES))

@@ -140,7 +140,8 @@ def open_dataset(path: Path | str) -> Dataset:
     check_folder(root)
     config, geometry = stated(root)
     touches, traces = read_touches(root, config), read_traces(root)
-    sequences = tuple(read_sequence(root, name) for name in sequence_names(root))
+    given = config.force_sigma, config.synthetic_stamps
+    sequences = tuple(read_sequence(root, name, *given) for name in sequence_names(root))
     check_splits(config, [sequence.name for sequence in sequences])
     observed = any(len(sequence) for sequence in sequences)
     if observed and not config.has_camera:
@@ -148,6 +149,13 @@ def open_dataset(path: Path | str) -> Dataset:
             FILE,
             "camera is missing, yet there are clouds; expected this table: add it",
             key="camera",
+        )
+    if observed and config.synthetic_stamps:
+        raise problem(
+            FILE,
+            'motion.stamps = "synthetic", yet there are clouds; expected measured stamps, since '
+            "clouds and tool are compared at the same time: leave this key out, or the clouds",
+            key="motion.stamps",
         )
     has_rest = observed or (root / "rest.ply").exists()
     if has_rest:

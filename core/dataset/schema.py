@@ -56,6 +56,9 @@ class DatasetConfig:
         camera_filters: names of the filters on its images.
         edge: width of the band along the phantom's edges in which depth is rounded [m]; the widest
             of the filters' if not stated.
+        force_sigma: standard deviation of one component of a force from the true one, beside the
+            sensor's noise and bias [N]; 0 if not stated.
+        synthetic_stamps: whether the stamps are made up, as of depth steps at rest.
         train: names of sequences for the fit.
         validation: names of sequences for validation.
         test: names of sequences for the test.
@@ -85,6 +88,8 @@ class DatasetConfig:
     test: tuple[str, ...]
     height_sigma: float | None = None
     phantom_from_robot: StatedPose | None = None
+    force_sigma: float = 0.0
+    synthetic_stamps: bool = False
     phantom_from_file: Transform = field(default_factory=Transform)
 
     def in_phantom_frame(self, size: Vector, phantom_from_file: Transform) -> DatasetConfig:
@@ -114,7 +119,10 @@ def read_config(root: Path) -> DatasetConfig:
     """
     top = Keys("", read_toml(root, FILE, _LIMIT))
     top.only(
-        ("format", "name", "phantom", "tool", "landmarks", "robot", "camera", "splits", "topics")
+        (
+            *("format", "name", "phantom", "tool", "landmarks", "robot", "camera", "force"),
+            *("motion", "splits", "topics"),
+        )
     )
     if (version := top.take("format")) != 1 or isinstance(version, bool):
         raise top.wrong("format", version, "1, the only version there is: convert the dataset")
@@ -127,6 +135,8 @@ def read_config(root: Path) -> DatasetConfig:
         **_landmarks(top.table("landmarks") if "landmarks" in top.values else Keys("", {})),
         phantom_from_robot=_robot(top.table("robot")) if "robot" in top.values else None,
         **_camera(top.table("camera") if "camera" in top.values else None),
+        force_sigma=_force(top.table("force")) if "force" in top.values else 0.0,
+        synthetic_stamps=_motion(top.table("motion")) if "motion" in top.values else False,
         **_splits(top.table("splits")),
     )
 
@@ -193,6 +203,21 @@ def _landmarks(keys: Keys) -> dict[str, Any]:
 def _sigma(keys: Keys, name: str) -> float | None:
     """An optional standard deviation of a length [m]."""
     return keys.number(name, 1e-6, 0.05, "m") if name in keys.values else None
+
+
+def _force(keys: Keys) -> float:
+    keys.only(("sigma",))
+    return keys.number("sigma", 0.0, 100.0, "N", default=0.0)
+
+
+def _motion(keys: Keys) -> bool:
+    """Whether stamps are made up."""
+    keys.only(("stamps",))
+    value = keys.take("stamps")
+    if value not in ("measured", "synthetic"):
+        expected = '"measured", or "synthetic" for depth steps at rest: write one of them'
+        raise keys.wrong("stamps", value, expected)
+    return bool(value == "synthetic")
 
 
 def _robot(keys: Keys) -> StatedPose | None:

@@ -38,7 +38,10 @@ KINEMATICS, CLOUDS, FORCES = "t,x,y,z,qx,qy,qz,qw", "t,file", "t,fx,fy,fz"
 LARGEST_FORCE = 1000.0
 """Largest plausible force on soft tissue [N]; a larger one has another unit."""
 SLOWEST_STEP = 0.5
-"""Largest plausible step of the kinematics [s]; a larger one has another unit."""
+"""Largest step of a stream of the kinematics [s]; a larger one is of depth steps at rest, or has
+another unit."""
+SHORTEST = 1.0
+"""Least duration of a recording [s]: rows that would last less in milliseconds are in seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +74,13 @@ class Forces:
     Attributes:
         time: (n,) [s].
         force: (n, 3) [N].
+        sigma: stated standard deviation of one component from the true force, beside noise and
+            bias [N].
     """
 
     time: FloatArray
     force: FloatArray
+    sigma: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,10 +132,19 @@ class Sequence:
         )
 
 
-def read_sequence(root: Path, name: str) -> Sequence:
-    """Read and check a sequence, without the points of its clouds."""
+def read_sequence(
+    root: Path, name: str, force_sigma: float = 0.0, at_rest: bool = False
+) -> Sequence:
+    """Read and check a sequence, without the points of its clouds.
+
+    Args:
+        root: of the dataset.
+        name: of the sequence.
+        force_sigma: stated standard deviation of a force [N].
+        at_rest: whether rows are stated to be depth steps at rest.
+    """
     home = f"sequences/{name}"
-    kinematics = read_kinematics(root, f"{home}/kinematics.csv")
+    kinematics = read_kinematics(root, f"{home}/kinematics.csv", at_rest)
     times, files = np.empty(0), tuple[str, ...]()
     clouds, forces = f"{home}/clouds.csv", f"{home}/forces.csv"
     has_forces = (root / forces).exists()
@@ -140,8 +155,9 @@ def read_sequence(root: Path, name: str) -> Sequence:
             home,
             "has neither clouds.csv nor forces.csv; expected at least one: add what was measured",
         )
-    felt = read_forces(root, forces) if has_forces else None
-    if felt is not None:
+    felt = None
+    if has_forces:
+        felt = replace(read_forces(root, forces), sigma=force_sigma)
         _check_overlap(forces, felt.time, kinematics.time)
     return Sequence(root, name, kinematics, times, files, felt)
 
@@ -164,8 +180,11 @@ def _check_overlap(file: str, time: FloatArray, clock: FloatArray) -> None:
     raise problem(file, text, row=FIRST_ROW, key="t", value=f"{time[0]:.3f}")
 
 
-def read_kinematics(root: Path, file: str) -> Kinematics:
-    """Read and check the tool's path from `file`, relative to the dataset `root`."""
+def read_kinematics(root: Path, file: str, at_rest: bool = False) -> Kinematics:
+    """Read and check the tool's path from `file`, relative to the dataset `root`.
+
+    Rows `at_rest` are depth steps, between which any time may pass.
+    """
     table = read_numbers(root, file, KINEMATICS)
     if len(table) < 2:
         raise problem(
@@ -176,10 +195,12 @@ def read_kinematics(root: Path, file: str) -> Kinematics:
     time, position, quaternion = table[:, 0].copy(), table[:, 1:4], table[:, 4:]
     check_increasing(file, time)
     check_coordinates(file, position)
-    if (step := float(np.median(np.diff(time)))) > SLOWEST_STEP:
+    step, span = float(np.median(np.diff(time))), float(time[-1] - time[0])
+    if step > SLOWEST_STEP and not at_rest and span / 1000 > SHORTEST:
         text = (
             f"t steps by {step:g} s; expected a stream of at least {1 / SLOWEST_STEP:g} Hz in "
-            "seconds: did you write milliseconds?"
+            "seconds: did you write milliseconds? Depth steps at rest are stated by [motion] "
+            'stamps = "synthetic" in dataset.toml'
         )
         raise problem(file, text, row=FIRST_ROW + 1, key="t", value=f"{step:g}")
     with np.errstate(over="ignore"):

@@ -21,6 +21,8 @@ def averaged(time: FloatArray, values: FloatArray, times: FloatArray) -> FloatAr
         values: (n, d).
         times: (m,) middles of the windows [s].
     """
+    if len(time) < 2:
+        return np.tile(values, (len(times), 1))
     integral = np.concatenate(
         [
             np.zeros((1, values.shape[1])),
@@ -29,9 +31,11 @@ def averaged(time: FloatArray, values: FloatArray, times: FloatArray) -> FloatAr
     )
 
     def until(at: FloatArray) -> FloatArray:
-        return np.stack(
-            [np.interp(at, time, integral[:, axis]) for axis in range(values.shape[1])], axis=-1
-        )
+        # Exact within a step: of a slow stream the window is a small part of one.
+        row = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+        into, step = (at - time[row])[:, None], (time[row + 1] - time[row])[:, None]
+        slope = (values[row + 1] - values[row]) / step
+        return np.asarray(integral[row] + into * (values[row] + slope * into / 2))
 
     low, high = (
         np.clip(times - SMOOTHING, time[0], time[-1]),

@@ -161,8 +161,9 @@ def _wrench_rules(wrench: Stream, pose: Stream, notes: ImportNotes) -> WrenchRul
     estimated = "measured_cf" in wrench.name
     if estimated:
         notes.warn(
-            f"{wrench.name} is an estimate from motor currents, about 2 N off in public work: no "
-            "stiffness can be trusted that rests on it"
+            f"{wrench.name} is an estimate from motor currents, about 2 N off in public work: the "
+            "dataset states this as [force] sigma, by which a diagnosis weighs its forces; state "
+            "[setup.force] sigma in N if yours are better"
         )
     if wrench.name.endswith("body/measured_cf"):
         notes.decide(f"{wrench.name} turns with the tool")

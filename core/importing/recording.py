@@ -14,7 +14,9 @@ from palpate.foundation.progress import Report, silent
 from palpate.importing.clocks.track import Track
 from palpate.importing.rules import ColumnRules
 from palpate.importing.sources.opened_sources import open_source
-from palpate.importing.stream import Sample, Source, Stream
+from palpate.importing.sources.table_source import TableSource
+from palpate.importing.stream import Sample, Source, Stream, StreamKind
+from palpate.importing.tables.table_preview import TablePreview
 
 __all__ = ["Recording", "opened_recording"]
 
@@ -38,9 +40,18 @@ class Recording:
         """List the streams of all sources."""
         return tuple(stream for source in self.sources for stream in source.streams())
 
-    def stream(self, name: str) -> Stream | None:
-        """The stream of this name; None where there is none."""
-        return next((one for one in self.streams() if one.name == name), None)
+    def named(self, name: str, kind: StreamKind) -> str:
+        """Name of this stream here: the same, or that of the only one of its kind.
+
+        Streams of files are named after them, and so differently in each recording; a topic has
+        the same name in all.
+        """
+        if not name or name.startswith("/"):
+            return name
+        streams = self.streams()
+        own = [one.name for one in streams if one.kind == kind]
+        known = any(one.name == name for one in streams)
+        return name if known or len(own) != 1 else own[0]
 
     def samples(self, name: str) -> Iterator[Sample]:
         """Read the samples of one stream in order of receipt."""
@@ -77,6 +88,22 @@ class Recording:
     def warnings(self) -> list[str]:
         """List the warnings of all sources."""
         return [warning for source in self.sources for warning in source.warnings]
+
+    def previews(self, rows: int = 3) -> tuple[TablePreview, ...]:
+        """First rows of its tables as they are understood."""
+        tables = (one for one in self.sources if isinstance(one, TableSource))
+        return tuple(found for one in tables if (found := one.preview(rows)) is not None)
+
+    def sure_seconds(self, without: Source) -> tuple[float, ...]:
+        """Durations [s] of the streams of other sources, but for tables with a doubtful unit."""
+        return tuple(
+            stream.seconds
+            for source in self.sources
+            if source is not without
+            and not (isinstance(source, TableSource) and "time_unit" in source.doubts)
+            for stream in source.streams()
+            if stream.count > 1 and stream.seconds > 0
+        )
 
     def close(self) -> None:
         """Close all sources."""

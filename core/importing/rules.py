@@ -23,6 +23,18 @@ Length = Annotated[float, Field(ge=-1.0, le=1.0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
 
 
+_AXES = "|".join(
+    f"{a}{b}{c}"
+    for axes in ("xyz", "XYZ")
+    for a in axes
+    for b in axes
+    for c in axes
+    if b not in (a, c)
+)
+_ROTATION = rf"^(|quaternion|rotation-vector|euler-({_AXES}))$"
+"""Ways to write a rotation; no axis twice in a row, and empty where it is not known."""
+
+
 class _Rules(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -106,17 +118,30 @@ class ColumnRules(_Rules):
     """Meaning of a table's columns.
 
     Attributes:
-        columns: column by quantity: t, received, x, y, z, qx, qy, qz, qw, fx, fy, fz, file; a
-            column without a name is called by its number, the first is "1".
+        columns: column by quantity: t, received, x, y, z, qx, qy, qz, qw, fx, fy, fz, file; q1 to
+            q4 for a quaternion by `quaternion_order`; a1 to a3 for the angles of `rotation` in
+            its order, or the components of a rotation vector. A column without a name is called
+            by its number, the first is "1".
         time_unit: of t.
         length_unit: of x, y, z.
         force_unit: of fx, fy, fz.
+        rotation: "quaternion"; "rotation-vector"; or "euler-" and three axes, small letters for
+            turns about fixed axes one after the other, capitals about the turned ones, as SciPy
+            has it. Roll, pitch and yaw are "euler-xyz"; A, B and C of a KUKA "euler-ZYX".
+        angle_unit: of a1, a2, a3.
+        quaternion_order: of q1 to q4, "xyzw" or "wxyz"; empty where it is not known.
+        rows: "stream", or "depth-steps" where each row is a step of a push at rest, whose time
+            does not matter; nx, ny, nz are then the outward normal, push tells one from another.
     """
 
     columns: dict[str, str]
     time_unit: Literal["s", "ms", "us", "ns", "s+ns"] = "s"
     length_unit: Literal["m", "cm", "mm"] = "m"
     force_unit: Literal["N", "mN"] = "N"
+    rotation: Annotated[str, Field(pattern=_ROTATION)] = "quaternion"
+    angle_unit: Literal["rad", "deg"] = "rad"
+    quaternion_order: Literal["", "xyzw", "wxyz"] = ""
+    rows: Literal["stream", "depth-steps"] = "stream"
 
 
 class CutRules(_Rules):
@@ -184,7 +209,8 @@ class ImportMapping(_Rules):
         rest: where the rest cloud comes from.
         touches: file of touches; empty to find them as dwells.
         traces: file of traces; empty for none.
-        setup: tables of dataset.toml: phantom, tool, landmarks, robot, camera, splits.
+        setup: tables of dataset.toml: phantom, tool, landmarks, robot, camera, force, motion,
+            splits.
         setup_folder: folder of the files that `setup` names.
     """
 

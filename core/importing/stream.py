@@ -70,15 +70,18 @@ class Source(Protocol):
 
     Attributes:
         path: of the file or folder.
-        warnings: found on opening and reading.
         has_receipt: whether times of receipt are a clock of their own.
         rules: meaning of its columns, of a table; None otherwise.
     """
 
     path: Path
-    warnings: list[str]
     has_receipt: bool
     rules: ColumnRules | None
+
+    @property
+    def warnings(self) -> list[str]:
+        """List what was found on opening and reading."""
+        ...
 
     def streams(self) -> tuple[Stream, ...]:
         """List the streams."""

@@ -9,13 +9,19 @@ from typing import Any
 
 from palpate.dataset.files import read_toml
 from palpate.foundation.errors import DatasetError
+from palpate.importing.cutting.probing_sequences import with_probing
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.output.stated_setup import SETUP_TABLES
+from palpate.importing.presets.known_presets import preset_of
+from palpate.importing.presets.preset import Preset
 from palpate.importing.proposed_mapping import proposed_mapping, recording_name
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ColumnRules, ImportMapping, RestRules
+from palpate.importing.sources.agreed_rules import agree_rules
 from palpate.importing.sources.opened_sources import is_source, open_source
+from palpate.importing.sources.table_source import TableSource
 from palpate.importing.stream import Source
+from palpate.importing.tables.table_evidence import TableEvidence
 
 __all__ = ["Survey", "survey"]
 
@@ -38,6 +44,8 @@ class Survey:
         touches: file of touches.
         traces: file of traces.
         rest: file of the rest cloud.
+        preset: name of the layout; empty to go by the look of each path.
+        laid_out: paths of which the layout is known.
     """
 
     recordings: list[Recording] = field(default_factory=list)
@@ -48,6 +56,8 @@ class Survey:
     touches: str = ""
     traces: str = ""
     rest: str = ""
+    preset: str = ""
+    laid_out: list[tuple[Preset, Path]] = field(default_factory=list)
 
     def close(self) -> None:
         """Close all recordings."""
@@ -57,6 +67,7 @@ class Survey:
     def proposal(self, name: str, notes: ImportNotes) -> ImportMapping:
         """Propose a mapping; DatasetError where no stream is the pose of a tool."""
         tables: dict[str, ColumnRules] = {}
+        self._agree(notes)
         for recording in self.recordings:
             for source in recording.sources:
                 if source.rules is not None:
@@ -66,27 +77,42 @@ class Survey:
         mapping = proposed_mapping(
             self.recordings, self.name or name, self.setup, tables, self.topics, notes
         )
+        for preset, path in self.laid_out:
+            notes.decide(f"{path.name}: read as {preset.name}, {preset.summary}")
+            mapping = preset.completed(mapping, path, notes)
+        mapping = with_probing(mapping, self.recordings, notes)
         return mapping.model_copy(
             update={
                 "touches": self.touches,
                 "traces": self.traces,
                 "rest": RestRules(file=self.rest),
-                "setup_folder": self.setup_folder,
+                "setup_folder": self.setup_folder or mapping.setup_folder,
             }
         )
 
+    def _agree(self, notes: ImportNotes) -> None:
+        """Settle units and rotations of tables by what is stated beside them."""
+        for recording in self.recordings:
+            tables = [one for one in recording.sources if isinstance(one, TableSource)]
+            for table in tables:
+                evidence = TableEvidence.of(
+                    self.setup, self.touches, recording.sure_seconds(without=table)
+                )
+                agree_rules(table, evidence, notes)
 
-def survey(paths: Sequence[Path], setup: Path | None) -> Survey:
+
+def survey(paths: Sequence[Path], setup: Path | None, preset: str = "") -> Survey:
     """Open recordings and read what is stated beside them.
 
     Args:
         paths: recordings, tables, folders of them, datasets, and files by their names in a
             dataset: touches.csv, traces.csv, rest.ply, dataset.toml.
         setup: a dataset.toml; None without.
+        preset: name of the layout of the recordings; empty to go by their look.
 
     Raises DatasetError where one cannot be read, or where it is open which belong together.
     """
-    found = Survey()
+    found = Survey(preset=preset)
     loose: list[Source] = []
     try:
         for path in paths:
@@ -112,6 +138,11 @@ def _take(found: Survey, loose: list[Source], path: Path) -> None:
         return
     if (path / _SETUP).is_file() and (path / "sequences").is_dir():
         _take_dataset(found, path)
+        return
+    preset = preset_of(path, found.preset)
+    if preset is not None:
+        found.laid_out.append((preset, path))
+        found.recordings.extend(preset.recordings(path))
         return
     if path.is_dir() and not is_source(path):
         children = sorted(one for one in path.iterdir() if not one.name.startswith((".", "@")))

@@ -61,13 +61,15 @@ def timed_recording(
     Raises DatasetError where there is no pose, or its frame changes.
     """
     streams = mapping.streams
-    names = {streams.pose: True}
-    if streams.cloud and recording.stream(streams.cloud) is not None:
-        names[streams.cloud] = False
-    if streams.wrench and recording.stream(streams.wrench) is not None:
-        names[streams.wrench] = True
+    roles = {
+        "pose": recording.named(streams.pose, "pose"),
+        "cloud": recording.named(streams.cloud, "cloud"),
+        "wrench": recording.named(streams.wrench, "wrench"),
+    }
+    there = {one.name for one in recording.streams()}
+    names = {name: role != "cloud" for role, name in roles.items() if name in there}
     found = recording.tracks(names, report)
-    if streams.pose not in found:
+    if roles["pose"] not in found:
         known = ", ".join(one.name for one in recording.streams())
         raise DatasetError(
             f"{recording.name} has no samples of {streams.pose}; it has {known}: name the pose of "
@@ -75,7 +77,6 @@ def timed_recording(
             key="streams.pose",
             value=streams.pose,
         )
-    roles = {"pose": streams.pose, "cloud": streams.cloud, "wrench": streams.wrench}
     tracks = {role: found[name] for role, name in roles.items() if name in found}
     _check_frame(recording, tracks["pose"], mapping)
     if mapping.time.stamps == "header":

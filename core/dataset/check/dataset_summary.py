@@ -21,6 +21,8 @@ __all__ = ["ClockSummary", "DatasetSummary", "SequenceSummary", "check_dataset"]
 
 DROPOUT = 1.8
 """Interval over the median one from which a stamp is missing [1]."""
+AT_REST = 0.2
+"""Median interval from which rows are depth steps at rest, between which no row is lost [s]."""
 HARMLESS_GAP = 0.02
 """Interval of kinematics and forces in which the tool hardly moves [s]; never a drop-out."""
 
@@ -174,6 +176,8 @@ def _clock(times: FloatArray, harmless: float = 0.0) -> ClockSummary:
     intervals = np.diff(times)
     median = float(np.median(intervals))
     lost = intervals > max(DROPOUT * median, harmless)
+    if harmless and median > AT_REST:
+        lost[:] = False
     jitter = float(intervals[~lost].std())
     return ClockSummary(
         count=len(times),
@@ -196,6 +200,11 @@ def _doubts(dataset: Dataset) -> list[str]:
     if not dataset.config.test:
         doubts.append(
             "no sequence is kept for the test, so no gain can be shown: name one in splits.test"
+        )
+    if dataset.config.synthetic_stamps:
+        doubts.append(
+            'dataset.toml: motion.stamps = "synthetic": the stamps are no measured times, so that '
+            "nothing that takes time, such as relaxation, can be told from these data"
         )
     doubts += [f"dataset.toml: {text}" for text in frame_notes(dataset.config)]
     doubts += [

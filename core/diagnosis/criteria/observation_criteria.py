@@ -161,6 +161,20 @@ class ForceErrorCriteria:
     least_samples: int = threshold(
         20, "1", "Fewest samples of a bias reading, and fewest windows for the sensor's noise."
     )
+    fewest_samples: int = threshold(5, "1", "Fewest samples of a bias reading of a slow stream.")
+    least_steps: int = threshold(
+        4, "1", "Fewest forces in contact by which a push's own constant is told."
+    )
+    least_range: float = threshold(
+        0.5e-3, "m", "Least range of depths by which a push's own constant is told."
+    )
+    constant_share: float = threshold(
+        0.15,
+        "1",
+        "Standard deviation of what is left of a push's fitted constant, over its largest force.",
+        "derived: where the force goes with the depth to the power of 1.3 to 1.7 in place of 1.5, "
+        "as over thin and stiffening bodies, the fitted constant is 10 to 15 % off",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -69,7 +69,11 @@ def predict_forces(
     rows, count = len(frames), columns.count if columns is not None else 0
     nothing = np.zeros((rows, 0))
     forces = ForceComparison.of(
-        path.measured, frames, changes, np.array([group.push for group in data.groups])
+        path.measured,
+        frames,
+        changes,
+        np.array([group.push for group in data.groups]),
+        data.forces.offset if data.forces is not None else 0.0,
     )
     return Prediction(
         data.name, nothing, nothing, nothing, np.zeros((rows, 0, count)), tuple(frames), (), forces

@@ -41,8 +41,8 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
         setup: as stated.
         most: largest number of groups.
 
-    Raises DiagnosisError if the tool is never clear of the body, so that the sensor's bias is
-    unknown, or if nothing is pushed.
+    Raises DiagnosisError if nothing is pushed, or if the sensor's bias is unknown: the tool is
+    never clear of the body, and no push has forces at several depths.
     """
     home = f"sequences/{sequence.name}"
     if sequence.forces is None:
@@ -50,14 +50,7 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
             f"{home}: has neither clouds nor forces; leave it out of [splits]", file=home
         )
     clock, stream = sequence.kinematics, sequence.forces
-    clear = _gap(setup, smooth_centres(clock, stream.time)) > CLEARANCE
-    record = ForceRecord.of(stream, clear)
-    if record is None:
-        raise DiagnosisError(
-            f"{home}/forces.csv: the tool is hardly ever clear of the phantom, so that the "
-            "sensor's bias is unknown; record a second or more before it touches",
-            file=f"{home}/forces.csv",
-        )
+    gap = _gap(setup, smooth_centres(clock, stream.time))
     begin, end = max(clock.time[0], stream.time[0]), min(clock.time[-1], stream.time[-1])
     times = np.arange(begin, end, CRITERIA.force_only.time_step)
     depth = -_gap(setup, smooth_centres(clock, times)) if len(times) else np.empty(0)
@@ -69,6 +62,19 @@ def observe_forces(sequence: Sequence, setup: Setup, most: int) -> Observations:
             f"(at most {deepest:.2f} mm into the phantom as stated); check touches.csv and the "
             "surface, or leave it out of [splits]",
             file=home,
+        )
+    record = ForceRecord.of(stream, gap > CLEARANCE)
+    if record is None:
+        spans = [(float(times[run.start]), float(times[run.stop - 1])) for run in pushes]
+        record = ForceRecord.of_pushes(stream, -gap, spans)
+    if record is None:
+        raise DiagnosisError(
+            f"{home}/forces.csv: the tool is hardly ever clear of the phantom, so that the "
+            "sensor's bias is unknown, and no push has forces at "
+            f"{CRITERIA.force_error.least_steps} depths or more over "
+            f"{1e3 * CRITERIA.force_error.least_range:.1f} mm to fit its own; record a second or "
+            "more before it touches, or more depths of each push",
+            file=f"{home}/forces.csv",
         )
     instants, groups = _instants(times, depth, _thinned(pushes, most))
     return Observations(sequence.name, instants, clock, groups, record, force_only=True)

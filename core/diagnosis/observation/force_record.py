@@ -2,7 +2,9 @@
 
 The sensor's bias wanders. While the tool is clear of the phantom the sensor reads the bias alone.
 In between the bias is interpolated linearly, with the variance of a Brownian bridge whose rate is
-estimated from the untouched stretches. The engine's own error of a force is one common factor for
+estimated from the untouched stretches. Where the tool never is clear, each push has a constant of
+its own, which is fitted with it. The deviation that a dataset states for its forces adds to all of
+it. The engine's own error of a force is one common factor for
 each push, and a smaller independent error for each group.
 """
 
@@ -23,6 +25,7 @@ from palpate.replay.replay import Equilibrium
 __all__ = [
     "ForceComparison",
     "ForceRecord",
+    "constant_discrepancy",
     "depth_discrepancy",
     "force_discrepancy",
     "force_scatter",
@@ -41,13 +44,16 @@ class ForceRecord:
         time: (n,) [s].
         force: (n, 3) on the tool, without bias [N].
         white: variance of an average over the smoothing time [N^2].
-        bias_variance: (n,) variance of the interpolated bias [N^2].
+        bias_variance: (n,) variance of the interpolated bias, and of the stated deviation [N^2].
+        offset: standard deviation of what is left of each push's own constant [N]; 0 where the
+            sensor was read clear of the phantom.
     """
 
     time: FloatArray
     force: FloatArray
     white: float
     bias_variance: FloatArray
+    offset: float = 0.0
 
     @classmethod
     def of(cls, forces: Forces, untouched: BoolArray) -> ForceRecord | None:
@@ -69,7 +75,40 @@ class ForceRecord:
             time,
             free,
             _white(time, free, untouched, sample),
-            _bias_variance(time, centre, rate, sample / count),
+            _bias_variance(time, centre, rate, sample / count) + forces.sigma**2,
+        )
+
+    @classmethod
+    def of_pushes(
+        cls, forces: Forces, depth: FloatArray, pushes: Sequence[tuple[float, float]]
+    ) -> ForceRecord | None:
+        """Remove a constant of each push, by the force's course with depth to the power of 1.5.
+
+        Args:
+            forces: the stream.
+            depth: (n,) overlap of tool and stated phantom at its stamps [m].
+            pushes: first and last time in contact of each [s].
+
+        Returns:
+            None if no push has forces at enough depths.
+        """
+        time, criteria = forces.time, CRITERIA.force_error
+        fits = []
+        for start, end in pushes:
+            own = (time >= start) & (time <= end) & (depth > 0)
+            if own.sum() >= criteria.least_steps and np.ptp(depth[own]) >= criteria.least_range:
+                rows = np.stack([np.ones(int(own.sum())), depth[own] ** 1.5], axis=-1)
+                fits.append((0.5 * (start + end), *_constant(rows, forces.force[own])))
+        if not fits:
+            return None
+        middle, constant, size, residual = (np.array(part) for part in zip(*fits, strict=True))
+        nearest = np.abs(time[:, None] - middle).argmin(axis=1)
+        return cls(
+            time,
+            forces.force - constant[nearest],
+            float(np.median(residual)),
+            np.full(len(time), forces.sigma**2),
+            criteria.constant_share * float(np.sqrt(np.mean(size**2))),
         )
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -81,6 +120,19 @@ class ForceRecord:
         return force, np.interp(times, self.time, self.bias_variance)
 
 
+def _constant(rows: FloatArray, force: FloatArray) -> tuple[FloatArray, float, float]:
+    """Fit a constant and a slope to forces (n, 3) [N].
+
+    Returns:
+        the constant (3,) [N], the largest force beyond it [N], and the variance left [N^2].
+    """
+    scale = np.array([1.0, float(np.abs(rows[:, 1]).max())])
+    fit = np.linalg.lstsq(rows / scale, force, rcond=None)[0]
+    left = force - rows / scale @ fit
+    largest = float(np.linalg.norm(force - fit[0], axis=1).max())
+    return fit[0], largest, float((left**2).sum() / max(3 * (len(force) - 2), 1))
+
+
 def _readings(
     time: FloatArray, force: FloatArray, untouched: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -90,9 +142,11 @@ def _readings(
     run = np.cumsum(np.diff(untouched.astype(int), prepend=0) == 1)
     start = np.full(run.max() + 1, time[0])
     start[run[::-1]] = time[::-1]
-    criteria = CRITERIA.force_error
-    # A slow stream needs longer for a reading of as many samples.
-    slow = 1.5 * criteria.least_samples * float(np.median(np.diff(time)))
+    criteria, step = CRITERIA.force_error, float(np.median(np.diff(time)))
+    # A slow stream has few samples in any second; their variance is that of fewer.
+    usual = int(criteria.bias_interval / step)
+    least = min(criteria.least_samples, max(criteria.fewest_samples, usual))
+    slow = 1.5 * least * step
     cell = np.stack([run, (time - start[run]) // max(criteria.bias_interval, slow)], axis=1)[
         untouched
     ]
@@ -101,10 +155,7 @@ def _readings(
         np.bincount(index.ravel(), weights=values, minlength=len(count))
         for values in (time[untouched], *force[untouched].T)
     ]
-    means, enough = (
-        np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None],
-        count >= CRITERIA.force_error.least_samples,
-    )
+    means, enough = (np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None], count >= least)
     return means[enough, 0], means[enough, 1:], count[enough].astype(float)
 
 
@@ -151,6 +202,7 @@ class ForceComparison:
         force: (g, 3) simulated [N].
         columns: (g, 3, k) change of gap, with the same columns as the surface's gap.
         push: (g,) number of each group's push, from 1; None if a clear group ends each push.
+        offset: standard deviation of each push's own constant [N], which is part of `noise`.
     """
 
     gap: FloatArray
@@ -158,6 +210,7 @@ class ForceComparison:
     force: FloatArray
     columns: FloatArray
     push: IntArray | None = None
+    offset: float = 0.0
 
     @classmethod
     def of(
@@ -166,6 +219,7 @@ class ForceComparison:
         frames: Sequence[Equilibrium],
         columns: Sequence[Any],
         push: IntArray | None = None,
+        offset: float = 0.0,
     ) -> ForceComparison:
         """Compare forces with a model.
 
@@ -174,16 +228,22 @@ class ForceComparison:
             frames: the model's equilibria.
             columns: for each group its changes (3, k); may be empty.
             push: (g,) number of each group's push.
+            offset: standard deviation of each push's own constant [N].
         """
         force = np.array([frame.force if frame.in_contact else np.zeros(3) for frame in frames])
         stacked: FloatArray = np.stack(columns) if columns else np.zeros((len(frames), 3, 0))
-        return cls(measured[0] - force, measured[1], force, stacked, push)
+        return cls(measured[0] - force, measured[1], force, stacked, push, offset)
 
     def of_groups(self, index: list[int]) -> ForceComparison:
         """Return the comparison of these groups alone."""
         push = None if self.push is None else self.push[index]
-        return ForceComparison(
-            self.gap[index], self.noise[index], self.force[index], self.columns[index], push
+        return replace(
+            self,
+            gap=self.gap[index],
+            noise=self.noise[index],
+            force=self.force[index],
+            columns=self.columns[index],
+            push=push,
         )
 
     def scaled(self, factor: float) -> ForceComparison:
@@ -201,9 +261,23 @@ class ForceComparison:
 
 
 def force_scatter(forces: ForceComparison) -> FloatArray:
-    """Variance (g, 3) [N^2] of each force: the sensor's, and the engine's own."""
+    """Variance (g, 3) [N^2] of each force: the sensor's without the constants of the pushes, and
+    the engine's own.
+    """
     engine = CRITERIA.force_error.group_error * np.linalg.norm(forces.force, axis=1)
-    return np.repeat((forces.noise**2 + engine**2)[:, None], 3, axis=1)
+    own = np.maximum(forces.noise**2 - forces.offset**2, 0.0)
+    return np.repeat((own + engine**2)[:, None], 3, axis=1)
+
+
+def constant_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) -> FloatArray:
+    """Columns (g, 3, 3 pushes) [N] of each push's own constant, of unit variance; none where the
+    sensor's bias is known.
+    """
+    if not forces.offset:
+        return np.zeros((*forces.force.shape, 0))
+    own = _pushes(forces, frames).astype(float)
+    found = forces.offset * np.einsum("gp,ik->gipk", own, np.eye(3))
+    return np.asarray(found.reshape(*forces.force.shape, -1))
 
 
 def force_discrepancy(forces: ForceComparison, frames: Sequence[Equilibrium]) -> FloatArray:

@@ -139,7 +139,9 @@ class Observations:
             [measured[one].mean(axis=0) if one else np.full(3, np.nan) for one in frames]
         )
         variance = [
-            self.forces.white / len(one) + bias_variance[one].mean() if one else np.nan
+            self.forces.white / len(one) + bias_variance[one].mean() + self.forces.offset**2
+            if one
+            else np.nan
             for one in frames
         ]
         return force @ phantom_from_robot.rotation.T, np.sqrt(variance)

@@ -92,7 +92,8 @@ class RecordedClouds:
     ) -> None:
         last = max([*wanted, *resting])
         camera: PinholeCamera | None = None
-        for row, sample in enumerate(self.recording.samples(self.mapping.streams.cloud)):
+        name = self.recording.named(self.mapping.streams.cloud, "cloud")
+        for row, sample in enumerate(self.recording.samples(name)):
             if row > last:
                 break
             if row not in wanted and row not in resting:

@@ -20,10 +20,13 @@ from palpate.importing.rules import ImportMapping
 from palpate.importing.timed_recording import TimedRecording
 from palpate.registration.robot.robot_statements import robot_fits, touched_centres
 
-__all__ = ["SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
+__all__ = ["ESTIMATED_SIGMA", "SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
 
-SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "splits")
+SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "force", "motion", "splits")
 """Tables of dataset.toml that an import takes over."""
+ESTIMATED_SIGMA = 2.0
+"""Standard deviation of forces that are estimated from motor currents [N]; public work on the dVRK
+finds about 2 N RMS."""
 _SURFACES = ("surface", "fixed_surface", "holder")
 
 
@@ -51,6 +54,10 @@ def write_setup(
 ) -> None:
     """Write dataset.toml and copy the files that it names, touches and traces."""
     values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup, "splits": splits}
+    if mapping.wrench.estimated and mapping.streams.wrench:
+        values["force"] = {"sigma": ESTIMATED_SIGMA, **mapping.setup.get("force", {})}
+    if any(rules.rows == "depth-steps" for rules in mapping.tables.values()):
+        values["motion"] = {"stamps": "synthetic", **mapping.setup.get("motion", {})}
     writer.text("dataset.toml", toml_text(values))
     home = base / mapping.setup_folder
     for key in _SURFACES:
@@ -75,7 +82,9 @@ def found_phantom(
     traces = read_traces(root)
     has_touches = (root / "touches.csv").exists()
     dataset = Dataset(root, config, none, False, (), geometry, traces)
-    if not has_touches and not len(traces) and config.phantom_from_robot is None:
+    # Depth steps at rest would be taken for dwells at landmarks.
+    dwells = not config.synthetic_stamps
+    if dwells and not has_touches and not len(traces) and config.phantom_from_robot is None:
         _find_touches(writer, dataset, recordings, notes)
         has_touches = (root / "touches.csv").exists()
     touches = read_touches(root, config) if has_touches else none

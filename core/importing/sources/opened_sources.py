@@ -15,8 +15,9 @@ def is_source(folder: Path) -> bool:
     """Whether a folder is one recording by itself."""
     from palpate.importing.sources.bag_source import BagSource
     from palpate.importing.sources.cloud_folder_source import CloudFolderSource
+    from palpate.importing.sources.depth_frames_source import DepthFramesSource
 
-    return BagSource.fits(folder) or CloudFolderSource.fits(folder)
+    return any(kind.fits(folder) for kind in (BagSource, CloudFolderSource, DepthFramesSource))
 
 
 def open_source(path: Path, rules: ColumnRules | None = None) -> Source:
@@ -30,6 +31,9 @@ def open_source(path: Path, rules: ColumnRules | None = None) -> Source:
     """
     from palpate.importing.sources.bag_source import BagSource
     from palpate.importing.sources.cloud_folder_source import CloudFolderSource
+    from palpate.importing.sources.depth_frames_source import DepthFramesSource
+    from palpate.importing.sources.probing_source import ProbingSource
+    from palpate.importing.sources.robot_frames_source import RobotFramesSource
     from palpate.importing.sources.table_source import TableSource
 
     if not path.exists():
@@ -38,8 +42,15 @@ def open_source(path: Path, rules: ColumnRules | None = None) -> Source:
         return BagSource(path)
     if CloudFolderSource.fits(path):
         return CloudFolderSource(path)
+    if DepthFramesSource.fits(path):
+        return DepthFramesSource(path)
+    if RobotFramesSource.fits(path):
+        return RobotFramesSource(path)
     if TableSource.fits(path):
-        return TableSource(path, rules)
+        table = TableSource(path, rules)
+        if table.rules is not None and table.rules.rows == "depth-steps":
+            return ProbingSource.of(table)
+        return table
     raise DatasetError(
         f"{path.name} is no recording that is known; expected .bag, .db3, .mcap, a folder with "
         "metadata.yaml, a table (.csv, .tsv, .txt, .mat), or a folder of clouds named by stamps",

@@ -13,18 +13,17 @@ from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError
 from palpate.importing.rules import ColumnRules
 from palpate.importing.sources.cloud_file import CLOUD_SUFFIXES, read_cloud_file
-from palpate.importing.sources.matlab_table import read_matlab
-from palpate.importing.sources.table_columns import proposed_columns
-from palpate.importing.sources.table_text import TextTable, read_table
 from palpate.importing.stream import Sample, Stream, StreamKind
+from palpate.importing.tables.matlab_table import read_matlab
+from palpate.importing.tables.table_columns import proposed_columns
+from palpate.importing.tables.table_preview import TablePreview, preview_of
+from palpate.importing.tables.table_rotation import row_quaternions
+from palpate.importing.tables.table_text import TextTable, read_table
+from palpate.importing.tables.table_units import METRES, NEWTONS, received_stamps, row_stamps
 
 __all__ = ["TableSource"]
 
-_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _FORCE = ("fx", "fy", "fz")
-_NANOSECONDS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-_METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-_NEWTONS = {"N": 1.0, "mN": 1e-3}
 
 
 class TableSource:
@@ -32,21 +31,29 @@ class TableSource:
 
     Attributes:
         path: of the file.
-        warnings: found on opening.
         rules: meaning of its columns; None where nothing is recognised.
+        stated: quantities whose unit stands in the name of their column.
+        doubts: sentences on what was taken by size only, by key of `rules`.
         has_receipt: whether times of receipt are a column of their own.
     """
 
     def __init__(self, path: Path, rules: ColumnRules | None = None) -> None:
         self.path = path
-        self.warnings: list[str] = []
-        self._table: TextTable = read_matlab(path) if path.suffix == ".mat" else read_table(path)
+        self.stated: frozenset[str] = frozenset()
+        self.doubts: dict[str, str] = {}
+        self.table: TextTable = read_matlab(path) if path.suffix == ".mat" else read_table(path)
         self.rules = rules
         if rules is None:
-            self.rules, doubts = proposed_columns(self._table)
-            self.warnings.extend(doubts)
+            proposed = proposed_columns(self.table)
+            self.rules, self.stated = proposed.rules, proposed.stated
+            self.doubts = dict(proposed.doubts)
         known = self.rules.columns if self.rules is not None else {}
         self.has_receipt = "t" in known and "received" in known
+
+    @property
+    def warnings(self) -> list[str]:
+        """List the doubts about its columns."""
+        return list(self.doubts.values())
 
     @staticmethod
     def fits(path: Path) -> bool:
@@ -66,13 +73,13 @@ class TableSource:
         """List what the columns hold: a pose, forces, clouds; or the unknown columns."""
         kinds = self._kinds()
         if not kinds:
-            columns = ", ".join(self._table.columns)
+            columns = ", ".join(self.table.columns)
             return (
                 Stream(
                     name=self.path.name,
                     kind="other",
                     message_type=f"table of {columns[:80]}",
-                    count=len(self._table),
+                    count=len(self.table),
                     seconds=0.0,
                 ),
             )
@@ -92,7 +99,9 @@ class TableSource:
         """Read the rows in their order."""
         kinds = [kind for kind in self._kinds() if f"{self.path.name}#{kind}" in names]
         times = self._times() if kinds else []
-        received = self._received() if self.has_receipt else times
+        received = times
+        if self.has_receipt and self.rules is not None:
+            received = received_stamps(self.table, self.rules)
         readers = {kind: self._reader(kind) for kind in kinds}
         for row, time in enumerate(times):
             for kind in kinds:
@@ -103,6 +112,12 @@ class TableSource:
                     frame="",
                     value=partial(readers[kind], row),
                 )
+
+    def preview(self, rows: int = 3) -> TablePreview | None:
+        """The first rows as they are understood; None where no column is."""
+        if self.rules is None:
+            return None
+        return preview_of(self.table, self.rules, self.doubts.values(), rows)
 
     def _kinds(self) -> list[StreamKind]:
         if self.rules is None:
@@ -119,50 +134,16 @@ class TableSource:
 
     def _column(self, quantity: str) -> list[str]:
         assert self.rules is not None
-        return self._table.texts(self.rules.columns[quantity])
+        return self.table.texts(self.rules.columns[quantity])
 
     def _numbers(self, quantity: str) -> FloatArray:
         assert self.rules is not None
-        return self._table.numbers(self.rules.columns[quantity])
+        return self.table.numbers(self.rules.columns[quantity])
 
     def _times(self) -> list[int]:
         """Stamps of the rows [ns]; whole numbers stay exact."""
         assert self.rules is not None
-        column = self.rules.columns.get("t") or self.rules.columns.get("received")
-        if column is None:
-            raise DatasetError(
-                f"{self.path.name} has no column of times; expected t: name it in its table of "
-                "columns",
-                file=self.path.name,
-                key="t",
-            )
-        if self.rules.time_unit == "s+ns":
-            seconds, nanoseconds = (self._whole(one) for one in column.split("+"))
-            return [10**9 * s + ns for s, ns in zip(seconds, nanoseconds, strict=True)]
-        unit = _NANOSECONDS[self.rules.time_unit]
-        whole = self._table.whole(column)
-        if whole is not None:
-            return [unit * one for one in whole]
-        return _exact(self._table, column, unit)
-
-    def _received(self) -> list[int]:
-        """Times of receipt [ns], in the unit of t."""
-        assert self.rules is not None
-        unit = _NANOSECONDS.get(self.rules.time_unit, 10**9)
-        column = self.rules.columns["received"]
-        whole = self._table.whole(column)
-        return _exact(self._table, column, unit) if whole is None else [unit * n for n in whole]
-
-    def _whole(self, column: str) -> list[int]:
-        whole = self._table.whole(column)
-        if whole is None:
-            raise DatasetError(
-                f"{self.path.name}: {column} is not whole everywhere; expected whole numbers of "
-                "seconds and nanoseconds",
-                file=self.path.name,
-                key=column,
-            )
-        return whole
+        return row_stamps(self.table, self.rules)
 
     def _reader(self, kind: StreamKind) -> Any:
         assert self.rules is not None
@@ -170,14 +151,12 @@ class TableSource:
             names = self._column("file")
             return lambda row: read_cloud_file(self._cloud(names[row]))
         if kind == "wrench":
-            unit = _NEWTONS[self.rules.force_unit]
+            unit = NEWTONS[self.rules.force_unit]
             forces = unit * np.stack([self._numbers(axis) for axis in _FORCE], axis=-1)
             return np.concatenate([forces, np.zeros_like(forces)], axis=1).__getitem__
-        unit = _METRES[self.rules.length_unit]
+        unit = METRES[self.rules.length_unit]
         places = unit * np.stack([self._numbers(axis) for axis in "xyz"], axis=-1)
-        turns = np.tile([0.0, 0.0, 0.0, 1.0], (len(places), 1))
-        if all(part in self.rules.columns for part in _POSE[3:]):
-            turns = np.stack([self._numbers(part) for part in _POSE[3:]], axis=-1)
+        turns = row_quaternions(self.table, self.rules)
         return np.concatenate([places, turns], axis=1).__getitem__
 
     def _cloud(self, name: str) -> Path:
@@ -189,17 +168,3 @@ class TableSource:
                 value=name[:80],
             )
         return path
-
-
-def _exact(table: TextTable, column: str, unit: int) -> list[int]:
-    """Decimal times in whole nanoseconds, without rounding of a double."""
-    times = table.numbers(column)
-    stamps = []
-    for text, number in zip(table.texts(column), times.tolist(), strict=True):
-        whole, point, rest = text.strip().replace(",", ".").partition(".")
-        if point and rest.isdecimal() and whole.lstrip("+-").isdecimal():
-            part = int(rest) * unit / 10 ** len(rest)
-            stamps.append(int(whole) * unit + round(-part if whole.startswith("-") else part))
-        else:
-            stamps.append(round(number * unit))
-    return stamps

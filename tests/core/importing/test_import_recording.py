@@ -174,3 +174,21 @@ def test_a_dataset_with_bags_opens_directly_and_the_second_time_at_once(
     (with_bags / "touches.csv").touch()
     assert palpate.open_dataset(with_bags).path != opened.path
     assert palpate.open_dataset(original).path == original
+
+
+def test_estimated_forces_state_their_deviation_in_the_dataset(
+    original: Path, tmp_path: Path
+) -> None:
+    paths = bags(original, tmp_path / "bags", "ros1")
+    found = survey(
+        [*paths, original / "touches.csv", original / "rest.ply"], original / "dataset.toml"
+    )
+    mapping = found.proposal("again", ImportNotes())
+    found.close()
+    estimated = mapping.wrench.model_copy(update={"estimated": True})
+    mapping = mapping.model_copy(update={"wrench": estimated})
+    import_recordings(mapping, Path.cwd(), tmp_path / "made", ImportNotes())
+    assert open_dataset(tmp_path / "made").config.force_sigma == 2.0
+    better = mapping.model_copy(update={"setup": {**mapping.setup, "force": {"sigma": 0.3}}})
+    import_recordings(better, Path.cwd(), tmp_path / "better", ImportNotes())
+    assert open_dataset(tmp_path / "better").config.force_sigma == 0.3

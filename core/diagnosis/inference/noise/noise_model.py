@@ -21,6 +21,7 @@ from palpate.diagnosis.inference.noise.isolated_errors import isolated_errors
 from palpate.diagnosis.inference.noise.partly_seen import partly_seen
 from palpate.diagnosis.inference.noise.shared_noise import clouds_in_patches, shared_noise
 from palpate.diagnosis.observation.force_record import (
+    constant_discrepancy,
     depth_discrepancy,
     force_discrepancy,
     force_scatter,
@@ -180,7 +181,8 @@ class Noise:
     def of_forces(cls, baseline: Prediction, fine: Prediction, lumps: slice) -> Noise:
         """Make the noise of a sequence without clouds, whose rows are those of the force.
 
-        The depth of each push has an uncertainty of its own. Arguments as for `of`.
+        The depth of each push has an uncertainty of its own, and its force a constant where the
+        sensor was never read clear of the phantom. Arguments as for `of`.
         """
         (gap, columns), finer = rows_of(baseline), rows_of(fine)[0]
         assert baseline.forces is not None
@@ -191,6 +193,7 @@ class Noise:
         parts = [
             force_discrepancy(baseline.forces, baseline.equilibria),
             depth_discrepancy(baseline.forces, baseline.equilibria),
+            constant_discrepancy(baseline.forces, baseline.equilibria),
             CRITERIA.noise.stiffness_error * columns[..., lumps].astype(float),
         ]
         weights = np.where(seen, 1 / scatter, 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,11 @@ class TextTable:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), []))
+
+    def head(self, rows: int) -> TextTable:
+        """The first rows as a table."""
+        columns = {name: texts[:rows] for name, texts in self.columns.items()}
+        return replace(self, columns=columns, lines=self.lines[:rows])
 
     def numbers(self, column: str) -> FloatArray:
         """A column as numbers (n,); DatasetError names the row of what is none."""

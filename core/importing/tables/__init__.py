@@ -1,0 +1,1 @@
+"""Tables of numbers: dialects, meaning of columns, units and rotations, depth steps, previews."""
