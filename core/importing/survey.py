@@ -54,8 +54,10 @@ class Survey:
         for one in self.recordings:
             one.close()
 
-    def proposal(self, name: str, notes: ImportNotes) -> ImportMapping:
-        """Propose a mapping; DatasetError where no stream is the pose of a tool."""
+    def proposal(self, name: str, notes: ImportNotes, needs_pose: bool = True) -> ImportMapping:
+        """Propose a mapping; DatasetError where no stream is the pose of a tool, and one is
+        needed.
+        """
         tables: dict[str, ColumnRules] = {}
         for recording in self.recordings:
             for source in recording.sources:
@@ -64,7 +66,7 @@ class Survey:
             for warning in recording.warnings():
                 notes.warn(warning)
         mapping = proposed_mapping(
-            self.recordings, self.name or name, self.setup, tables, self.topics, notes
+            self.recordings, self.name or name, self.setup, tables, self.topics, notes, needs_pose
         )
         return mapping.model_copy(
             update={
