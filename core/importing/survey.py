@@ -17,7 +17,7 @@ from palpate.importing.sources.opened_sources import is_source, open_source
 from palpate.importing.stated_setup import SETUP_TABLES
 from palpate.importing.stream import Source
 
-__all__ = ["Survey", "survey"]
+__all__ = ["Survey", "read_setup", "survey"]
 
 _SETUP = "dataset.toml"
 _TABLES = ("kinematics.csv", "clouds.csv", "forces.csv")
@@ -94,7 +94,7 @@ def survey(paths: Sequence[Path], setup: Path | None) -> Survey:
         for path in paths:
             _take(found, loose, path.resolve())
         if setup is not None:
-            _read_setup(found, setup.resolve())
+            read_setup(found, setup.resolve())
         found.recordings.extend(_grouped(loose))
         if not found.recordings:
             raise DatasetError("no recording is among the files; expected at least one")
@@ -129,7 +129,7 @@ def _is_statement(found: Survey, path: Path) -> bool:
     """Whether a file states something beside recordings, by its name; it is taken up then."""
     match path.name:
         case "dataset.toml":
-            _read_setup(found, path)
+            read_setup(found, path)
         case "touches.csv":
             found.touches = str(path)
         case "traces.csv":
@@ -143,7 +143,7 @@ def _is_statement(found: Survey, path: Path) -> bool:
 
 def _take_dataset(found: Survey, folder: Path) -> None:
     """Take up a dataset whose sequences are folders or bags."""
-    _read_setup(found, folder / _SETUP)
+    read_setup(found, folder / _SETUP)
     for name in ("touches.csv", "traces.csv", "rest.ply"):
         if (folder / name).is_file():
             _is_statement(found, folder / name)
@@ -159,7 +159,8 @@ def _take_dataset(found: Survey, folder: Path) -> None:
             found.recordings.append(Recording(recording_name(place), (open_source(place),)))
 
 
-def _read_setup(found: Survey, path: Path) -> None:
+def read_setup(found: Survey, path: Path) -> None:
+    """Take up a dataset.toml: its tables, its folder, the dataset's name and stated streams."""
     values = read_toml(path.parent, path.name, _LIMIT)
     found.setup = {key: values[key] for key in SETUP_TABLES if key in values}
     found.setup_folder = str(path.parent)
