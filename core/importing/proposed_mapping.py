@@ -42,6 +42,7 @@ def proposed_mapping(
     tables: dict[str, ColumnRules],
     topics: dict[str, str],
     notes: ImportNotes,
+    needs_pose: bool = True,
 ) -> ImportMapping:
     """Propose which streams are taken and what they mean.
 
@@ -52,13 +53,15 @@ def proposed_mapping(
         tables: meaning of columns, by file.
         topics: streams by role that are stated already.
         notes: take each choice.
+        needs_pose: whether a mapping without the pose of a tool is refused.
 
-    Raises DatasetError where no stream is the pose of a tool.
+    Raises DatasetError where no stream is the pose of a tool, and one is needed.
     """
     streams = [stream for one in recordings for stream in one.streams()]
-    pose = _stated(streams, topics.get("pose")) or _pose(streams)
-    notes.decide(f"pose of the tool: {pose.name}, frame '{_frame(pose)}'")
-    _warn_of_pose(pose, streams, notes)
+    pose = _stated(streams, topics.get("pose")) or _pose(streams, needs_pose)
+    if pose is not None:
+        notes.decide(f"pose of the tool: {pose.name}, frame '{_frame(pose)}'")
+        _warn_of_pose(pose, streams, notes)
     cloud = _stated(streams, topics.get("cloud")) or _cloud(streams)
     camera = _camera(streams, cloud) if cloud is not None and cloud.kind == "depth" else None
     if cloud is not None:
@@ -79,12 +82,12 @@ def proposed_mapping(
             for one in recordings
         ),
         streams=StreamChoice(
-            pose=pose.name,
+            pose=pose.name if pose else "",
             cloud=cloud.name if cloud else "",
             camera=camera.name if camera else "",
             wrench=wrench.name if wrench else "",
         ),
-        pose=PoseRules(frame=_frame(pose)),
+        pose=PoseRules(frame=_frame(pose) if pose else ""),
         wrench=rules,
         tables=tables,
         cutting=CutRules(cut=cut),
@@ -105,9 +108,9 @@ def _stated(streams: Sequence[Stream], name: str | None) -> Stream | None:
     return found
 
 
-def _pose(streams: Sequence[Stream]) -> Stream:
+def _pose(streams: Sequence[Stream], needed: bool) -> Stream | None:
     found = _best(streams, "pose", _POSES)
-    if found is not None:
+    if found is not None or not needed:
         return found
     if any(one.kind == "joints" for one in streams):
         names = ", ".join(dict.fromkeys(one.name for one in streams if one.kind == "joints"))
@@ -156,7 +159,7 @@ def _camera(streams: Sequence[Stream], image: Stream) -> Stream | None:
     return max(cameras, key=shared) if cameras else None
 
 
-def _wrench_rules(wrench: Stream, pose: Stream, notes: ImportNotes) -> WrenchRules:
+def _wrench_rules(wrench: Stream, pose: Stream | None, notes: ImportNotes) -> WrenchRules:
     notes.decide(f"forces: {wrench.name}, frame '{_frame(wrench)}'")
     estimated = "measured_cf" in wrench.name
     if estimated:
@@ -167,16 +170,17 @@ def _wrench_rules(wrench: Stream, pose: Stream, notes: ImportNotes) -> WrenchRul
     if wrench.name.endswith("body/measured_cf"):
         notes.decide(f"{wrench.name} turns with the tool")
         return WrenchRules(frame="tool", zero="fitted", estimated=True)
+    frame = _frame(pose) if pose else ""
     own_table = wrench.name.endswith("forces.csv#wrench")
     if (
         own_table
         or wrench.name.endswith("spatial/measured_cf")
-        or (_frame(wrench) and _frame(wrench) == _frame(pose))
+        or (_frame(wrench) and _frame(wrench) == frame)
     ):
         notes.decide(f"{wrench.name} is in the robot frame")
         return WrenchRules(frame="robot", estimated=estimated)
     notes.warn(
-        f"{wrench.name}: its frame '{_frame(wrench)}' is not that of the poses, '{_frame(pose)}'; "
+        f"{wrench.name}: its frame '{_frame(wrench)}' is not that of the poses, '{frame}'; "
         'state [wrench] frame as "robot" or "tool"'
     )
     return WrenchRules(estimated=estimated)

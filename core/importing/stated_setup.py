@@ -93,7 +93,7 @@ def found_phantom(
         return None
     notes.decide(f"robot and phantom: {fits[0].summary}" if fits[0].summary else "robot: stated")
     pose = fits[0].phantom_from_robot
-    return LocatedPhantom(geometry, config.tool_radius, pose, touches.positions)
+    return LocatedPhantom(geometry, config.tool_radius, pose, touches.positions, touches.names)
 
 
 def _find_touches(

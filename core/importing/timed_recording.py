@@ -17,7 +17,7 @@ from palpate.importing.import_notes import ImportNotes
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ImportMapping
 
-__all__ = ["TimedRecording", "timed_recording"]
+__all__ = ["TimedRecording", "on_one_clock", "timed_recording"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -65,7 +65,23 @@ def timed_recording(
         names[streams.cloud] = False
     if streams.wrench and recording.stream(streams.wrench) is not None:
         names[streams.wrench] = True
-    found = recording.tracks(names, report)
+    return on_one_clock(recording, recording.tracks(names, report), mapping, notes)
+
+
+def on_one_clock(
+    recording: Recording, found: dict[str, Track], mapping: ImportMapping, notes: ImportNotes
+) -> TimedRecording:
+    """Bring the chosen streams, as read, to one time line.
+
+    Args:
+        recording: that holds them.
+        found: its tracks by name of the stream, with the values of poses and forces.
+        mapping: which of them are taken.
+        notes: take what was done.
+
+    Raises DatasetError where there is no pose, or its frame changes.
+    """
+    streams = mapping.streams
     if streams.pose not in found:
         known = ", ".join(one.name for one in recording.streams())
         raise DatasetError(

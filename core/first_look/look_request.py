@@ -1,0 +1,145 @@
+"""Request of a first look: files, and what is stated about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from palpate.foundation.errors import DatasetError
+from palpate.importing.import_notes import ImportNotes
+from palpate.importing.mapping_file import read_mapping
+from palpate.importing.recording import Recording, opened_recording
+from palpate.importing.rules import ImportMapping
+from palpate.importing.survey import Survey, read_setup, survey
+
+__all__ = ["LookRequest", "bound_mapping", "is_dataset", "opened_sources"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookRequest:
+    """Recordings or a dataset, and what is stated about them.
+
+    Attributes:
+        files: recordings, tables, folders, statements; or the one folder of a dataset.
+        setup: a dataset.toml; None without.
+        mapping: an import.toml; None to propose one. Its files are looked for among `files` by
+            their names; without `files` they are taken as it names them.
+        streams: names of streams by role (pose, cloud, camera, wrench); an empty name for none.
+        name: of the look.
+        base: folder from which files are named in the look's mapping; None for whole paths.
+    """
+
+    files: tuple[Path, ...]
+    setup: Path | None = None
+    mapping: Path | None = None
+    streams: dict[str, str] = field(default_factory=dict)
+    name: str = "look"
+    base: Path | None = None
+
+
+def is_dataset(files: Sequence[Path]) -> bool:
+    """Whether the files are the one folder of a dataset."""
+    return (
+        len(files) == 1
+        and (files[0] / "dataset.toml").is_file()
+        and (files[0] / "sequences").is_dir()
+    )
+
+
+def opened_sources(
+    request: LookRequest, notes: ImportNotes
+) -> tuple[list[Recording], ImportMapping]:
+    """Open the recordings of a request, and read or propose their mapping.
+
+    Raises DatasetError where a file cannot be read, or the mapping names one that is not there.
+    """
+    if request.mapping is not None:
+        mapping = read_mapping(request.mapping)
+        home = request.mapping.resolve().parent
+        mapping = bound_mapping(mapping, request.files, home)
+        if request.setup is not None:
+            stated = Survey()
+            read_setup(stated, request.setup.resolve())
+            mapping = mapping.model_copy(
+                update={"setup": stated.setup, "setup_folder": stated.setup_folder}
+            )
+        recordings: list[Recording] = []
+        try:
+            for one in mapping.recordings:
+                paths = tuple(Path(file) for file in one.files)
+                recordings.append(opened_recording(one.name, paths, mapping.tables))
+        except BaseException:
+            for opened in recordings:
+                opened.close()
+            raise
+        return recordings, _with_streams(mapping, request.streams)
+    surveyed = survey(request.files, request.setup)
+    try:
+        named = {role: name for role, name in request.streams.items() if name and role != "camera"}
+        surveyed.topics = {**surveyed.topics, **named}
+        mapping = surveyed.proposal(request.name, notes, needs_pose=False)
+    except BaseException:
+        surveyed.close()
+        raise
+    return surveyed.recordings, _with_streams(mapping, request.streams)
+
+
+def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> ImportMapping:
+    """The mapping with the whole paths of its files.
+
+    Args:
+        mapping: as read.
+        files: among which the mapping's are looked for by their names; empty to take the mapping's
+            as they are.
+        home: folder from which the mapping names them.
+
+    Raises DatasetError for a file that is not among the given ones.
+    """
+    places = {path.name: path.resolve() for path in _spread(files)}
+
+    def bound(file: str, key: str) -> str:
+        if not file or not files:
+            return str((home / file).resolve()) if file else ""
+        name = Path(file).name
+        if name not in places:
+            raise DatasetError(
+                f"{key} names {name}, which is not among the files; there are "
+                f"{', '.join(sorted(places)[:20])}: bring it, or correct {key}",
+                key=key,
+                value=name,
+            )
+        return str(places[name])
+
+    recordings = tuple(
+        one.model_copy(update={"files": tuple(bound(file, "recordings") for file in one.files)})
+        for one in mapping.recordings
+    )
+    stated = next((str(p.parent) for name, p in places.items() if name == "dataset.toml"), "")
+    first = str(next(iter(places.values())).parent) if places else ""
+    return mapping.model_copy(
+        update={
+            "recordings": recordings,
+            "touches": bound(mapping.touches, "touches"),
+            "traces": bound(mapping.traces, "traces"),
+            "rest": mapping.rest.model_copy(update={"file": bound(mapping.rest.file, "rest.file")}),
+            "setup_folder": stated or first or str((home / mapping.setup_folder).resolve()),
+        }
+    )
+
+
+def _spread(files: Sequence[Path]) -> list[Path]:
+    """The files, and what lies in folders among them to two levels."""
+    found: list[Path] = []
+    for path in files:
+        found.append(path)
+        if path.is_dir():
+            found += [one for depth in ("*", "*/*") for one in sorted(path.glob(depth))]
+    return found
+
+
+def _with_streams(mapping: ImportMapping, streams: dict[str, str]) -> ImportMapping:
+    known = {
+        role: name for role, name in streams.items() if role in type(mapping.streams).model_fields
+    }
+    return mapping.model_copy(update={"streams": mapping.streams.model_copy(update=known)})
