@@ -20,7 +20,7 @@ export function foundSequences(recordings) {
       start,
       end,
       kind: kind ?? "",
-      split: split ?? null,
+      split: split === "none" ? null : split || null,
     })),
   );
 }

@@ -234,7 +234,9 @@ export function createImport({ redraw, openDataset, opened }) {
         post(`/looks/${encodeURIComponent(id)}/import`, {
           name,
           mapping: mapping(),
-          sequences: editor?.changed ? plain(editor.sequences) : null,
+          sequences: editor?.changed
+            ? plain(editor.sequences).map((one) => ({ ...one, split: one.split ?? "none" }))
+            : null,
         }),
       );
       if (!result) return;

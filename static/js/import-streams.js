@@ -2,7 +2,7 @@
 import { element } from "./dom.js";
 import { capitalise } from "./format.js";
 
-/** @import { ImportActions, ImportView, LookStream, StreamRole } from "./types.js" */
+/** @import { ImportActions, ImportView, Look, LookStream, StreamRole } from "./types.js" */
 
 /** @type {Record<StreamRole, string>} */
 export const ROLES = {
@@ -67,8 +67,8 @@ export function streamsSection(view, actions, problem) {
     ),
     streams.length ? null : element("p", { class: "empty" }, "No stream was found."),
     problem,
-    notes("Decided", look.decisions, "decided"),
-    notes("Doubtful", look.warnings, "doubtful"),
+    notes("Decided", told(look, look.decisions), "decided"),
+    notes("Doubtful", told(look, look.warnings), "doubtful"),
   );
 }
 
@@ -154,12 +154,28 @@ function notes(title, sentences, mark) {
 }
 
 /**
+ * Return sentences with times counted from the start of the recording, as the timeline has them.
+ * @param {Look} look
+ * @param {string[]} sentences
+ * @returns {string[]}
+ */
+const told = ({ recordings }, sentences) =>
+  sentences.map((text) =>
+    text.replace(/\b\d{6,}\.\d+/g, (number) => {
+      const within = recordings.find(
+        ({ start, end }) => start - 1 <= +number && +number <= end + 1,
+      );
+      return within ? (+number - within.start).toFixed(2) : number;
+    }),
+  );
+
+/**
  * @param {number | null} seconds
  * @returns {string}
  */
 const formatDelay = (seconds) =>
   seconds === null
-    ? "no time of receipt"
+    ? "not received"
     : Math.abs(seconds) > OTHER_CLOCK
       ? "another clock"
       : `${(1e3 * seconds).toFixed(1)} ms`;

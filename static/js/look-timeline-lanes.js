@@ -9,6 +9,10 @@
  *   y: (value: number) => number }} Axis
  */
 
+// How far above the surface the lane of depths goes: in mm, and in depths of the deepest push.
+const CLEAR = 4;
+const CLEARANCE = 1.5;
+
 /**
  * Draw the curves of a lane with an axis of three values; a lane of depth has a line at zero.
  * @param {Context} pen
@@ -28,12 +32,12 @@ export function drawCurve(pen, { scale, ink, plot }, lane, { top, bottom }) {
         high = Math.max(high, value * lane.factor);
       }
   if (!Number.isFinite(low)) [low, high] = [0, 1];
-  if (lane.curves.some(({ name }) => name === "depth") || lane.name === "force")
-    [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+  // Depth grows downwards, as the tool goes; far from the surface its curve leaves the lane.
+  const down = lane.curves.some(({ name }) => name === "depth");
+  if (down || lane.name === "force") [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+  if (down && high > 0) low = Math.max(low, -Math.max(CLEAR, CLEARANCE * high));
   const margin = (high - low || 1) * 0.08;
   [low, high] = [low - margin, high + margin];
-  // Depth grows downwards, as the tool goes.
-  const down = lane.curves.some(({ name }) => name === "depth");
   /** @param {number} value in the unit of the axis */
   const y = (value) => {
     const share = (value - low) / (high - low);

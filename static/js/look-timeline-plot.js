@@ -130,7 +130,7 @@ function drawSequences(pen, { scale, ink, plot }, { top, bottom }) {
 }
 
 /**
- * Write a text in the middle of a bar, or the shorter one, or nothing, as it fits.
+ * Write a text in the middle of a bar, or the shorter one, or its beginning, as it fits.
  * @param {Context} pen
  * @param {string} text
  * @param {string} short
@@ -140,7 +140,11 @@ function drawSequences(pen, { scale, ink, plot }, { top, bottom }) {
  */
 function writeWithin(pen, text, short, [a, b], y, colour) {
   const room = b - a - 12;
-  const shown = [text, short].find((one) => pen.measureText(one).width <= room);
+  /** @param {string} one */
+  const fits = (one) => pen.measureText(one).width <= room;
+  let shown = [text, short].find(fits) ?? "";
+  for (let length = short.length - 1; !shown && length > 2; length--)
+    if (fits(`${short.slice(0, length)}…`)) shown = `${short.slice(0, length)}…`;
   if (!shown) return;
   pen.fillStyle = colour;
   pen.textAlign = "center";
