@@ -142,12 +142,18 @@ class Services:
 
 
 def _awaited(jobs: Iterable[Job], arriving: Iterable[str]) -> frozenset[str]:
-    imports = [
+    needing = [
         job
         for job in jobs
-        if job.kind == "import" and (job.state.can_be_retried or not job.state.is_finished)
+        if job.kind in ("import", "look")
+        and (job.state.can_be_retried or not job.state.is_finished)
     ]
-    return frozenset([*arriving, *(str(job.request.get("archive")) for job in imports)])
+    files = (
+        str(file)
+        for job in needing
+        for file in (job.request.get("archive"), *job.request.get("uploads", ()))
+    )
+    return frozenset([*arriving, *files])
 
 
 def _tidy(disk: Disk, jobs: Iterable[Job], arriving: Iterable[str]) -> str:

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence as Items
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.dataset import Dataset, Sequence
-from palpate.first_look.look_files import LookFiles, ToolPath
+from palpate.first_look.look_files import LookFiles, LookPath
 from palpate.first_look.look_request import LookRequest, is_dataset, opened_sources
 from palpate.first_look.recorded_motion import MotionSeries, cloud_choice, without_poses
 from palpate.first_look.series import as_list
@@ -202,7 +202,7 @@ class _Look:
                 staged_clouds, recording, one.timed, shown, self.mapping, one.phantom, self.writer,
                 self.notes, share,
             )  # fmt: skip
-            found.append(kept or replace(_empty(self.writer.folder, one.timed)))
+            found.append(_empty(self.writer.folder, one.timed) if kept is None else kept)
         return found
 
     def _recording(
@@ -212,7 +212,7 @@ class _Look:
         timed = one.timed
         if one.has_poses:
             every = 1 + (len(timed.pose_times) - 1) // MOST_PLACES
-            self.files.write_path(at, ToolPath(timed.time[::every], one.places()[::every]))
+            self.files.write_path(at, LookPath(timed.time[::every], one.places()[::every]))
         ends = [times[[0, -1]] for times in (timed.pose_times, timed.cloud_times) if len(times)]
         span = np.concatenate(ends) / 1e9 if ends else np.zeros(1)
         return {

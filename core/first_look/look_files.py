@@ -12,7 +12,7 @@ import numpy as np
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import RunError
 
-__all__ = ["LOOK", "LookFiles", "LookSurface", "ShownCloud", "ToolPath"]
+__all__ = ["LOOK", "LookFiles", "LookPath", "LookSurface", "ShownCloud"]
 
 LOOK = "look.json"
 """File that a look has once it is finished."""
@@ -42,7 +42,7 @@ class LookSurface:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolPath:
+class LookPath:
     """Times (n,) [s] and tool centres (n, 3) [m] of one recording, phantom or robot frame."""
 
     time: FloatArray
@@ -80,7 +80,7 @@ class LookFiles:
             faces=np.asarray(faces, dtype=np.int32),
         )
 
-    def write_path(self, recording: int, path: ToolPath) -> None:
+    def write_path(self, recording: int, path: LookPath) -> None:
         """Write the path of the tool in a recording."""
         np.savez(self.folder / f"path-{recording:03d}.npz", time=path.time, places=path.places)
 
@@ -102,10 +102,10 @@ class LookFiles:
         place = self.folder / "surface.npz"
         return LookSurface(*self._arrays(place, "vertices", "faces")) if place.exists() else None
 
-    def path(self, recording: int) -> ToolPath | None:
+    def path(self, recording: int) -> LookPath | None:
         """The path of the tool in a recording; None without."""
         place = self.folder / f"path-{recording:03d}.npz"
-        return ToolPath(*self._arrays(place, "time", "places")) if place.exists() else None
+        return LookPath(*self._arrays(place, "time", "places")) if place.exists() else None
 
     def _cloud(self, recording: int, number: int) -> Path:
         return self.folder / "clouds" / f"{recording:03d}-{number:06d}.npz"

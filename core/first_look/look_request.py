@@ -11,9 +11,13 @@ from palpate.importing.import_notes import ImportNotes
 from palpate.importing.mapping_file import read_mapping
 from palpate.importing.recording import Recording, opened_recording
 from palpate.importing.rules import ImportMapping
+from palpate.importing.stated_setup import SURFACES
 from palpate.importing.survey import Survey, read_setup, survey
 
 __all__ = ["LookRequest", "bound_mapping", "is_dataset", "opened_sources"]
+
+_BESIDE = (".stl", ".obj", ".ply", ".pcd", ".png", ".npy", ".npz", ".json", ".xyz")
+"""Endings of files that are no recordings by themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +77,9 @@ def opened_sources(
             for opened in recordings:
                 opened.close()
             raise
+        mapping = _with_surfaces(mapping, request.files)
         return recordings, _with_streams(mapping, request.streams)
-    surveyed = survey(request.files, request.setup)
+    surveyed = survey(_recorded(request.files, notes), request.setup)
     try:
         named = {role: name for role, name in request.streams.items() if name and role != "camera"}
         surveyed.topics = {**surveyed.topics, **named}
@@ -82,7 +87,38 @@ def opened_sources(
     except BaseException:
         surveyed.close()
         raise
+    mapping = _with_surfaces(mapping, request.files)
     return surveyed.recordings, _with_streams(mapping, request.streams)
+
+
+def _recorded(files: Sequence[Path], notes: ImportNotes) -> list[Path]:
+    """The files without those that are no recordings by themselves, such as a surface that the
+    setup names.
+    """
+    beside = [
+        one
+        for one in files
+        if one.is_file() and one.suffix.lower() in _BESIDE and one.stem != "rest"
+    ]
+    if beside and len(beside) < len(files):
+        names = ", ".join(one.name for one in beside)
+        notes.decide(f"no recordings by themselves, used where setup or tables name them: {names}")
+        return [one for one in files if one not in beside]
+    return list(files)
+
+
+def _with_surfaces(mapping: ImportMapping, files: Sequence[Path]) -> ImportMapping:
+    """The mapping with the folder in which the surfaces that the setup names lie: beside the setup,
+    else beside a recording.
+    """
+    phantom = mapping.setup.get("phantom", {})
+    named = [phantom.get(key, []) for key in SURFACES] if isinstance(phantom, dict) else []
+    names = [str(one) for some in named for one in ([some] if isinstance(some, str) else some)]
+    homes = [Path(mapping.setup_folder), *(file.resolve().parent for file in files)]
+    for home in homes if names else ():
+        if all((home / name).is_file() for name in names):
+            return mapping.model_copy(update={"setup_folder": str(home)})
+    return mapping
 
 
 def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> ImportMapping:
@@ -96,11 +132,15 @@ def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> 
 
     Raises DatasetError for a file that is not among the given ones.
     """
-    places = {path.name: path.resolve() for path in _spread(files)}
+    sources = [path.resolve() for path in files]
+    places = {path.name: path.resolve() for path in _spread(sources)}
 
     def bound(file: str, key: str) -> str:
-        if not file or not files:
-            return str((home / file).resolve()) if file else ""
+        if not file:
+            return ""
+        found = (home / file).resolve()
+        if not files or any(found.is_relative_to(one) for one in sources):
+            return str(found)
         name = Path(file).name
         if name not in places:
             raise DatasetError(
@@ -115,15 +155,17 @@ def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> 
         one.model_copy(update={"files": tuple(bound(file, "recordings") for file in one.files)})
         for one in mapping.recordings
     )
-    stated = next((str(p.parent) for name, p in places.items() if name == "dataset.toml"), "")
-    first = str(next(iter(places.values())).parent) if places else ""
+    folder = (home / mapping.setup_folder).resolve()
+    if files and not any(one.parent == folder or folder.is_relative_to(one) for one in sources):
+        stated = (path.parent for name, path in places.items() if name == "dataset.toml")
+        folder = next(stated, sources[0].parent)
     return mapping.model_copy(
         update={
             "recordings": recordings,
             "touches": bound(mapping.touches, "touches"),
             "traces": bound(mapping.traces, "traces"),
             "rest": mapping.rest.model_copy(update={"file": bound(mapping.rest.file, "rest.file")}),
-            "setup_folder": stated or first or str((home / mapping.setup_folder).resolve()),
+            "setup_folder": str(folder),
         }
     )
 

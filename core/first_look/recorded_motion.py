@@ -22,9 +22,8 @@ from palpate.importing.timed_recording import TimedRecording
 
 __all__ = ["MotionSeries", "cloud_choice", "without_poses"]
 
-_ENOUGH = 1000
-"""Rows of an averaged path from which it shows a motion as well as the raw one does."""
-_MOST_RAW = 6000
+_MOST_RAW = 60_000
+"""Poses beyond which a path is averaged over short steps before its extremes are looked for."""
 
 
 def without_poses(
@@ -74,10 +73,9 @@ class MotionSeries:
         """Path of the tool with its depth in the stated surface, as in look.json."""
         if not self.has_poses:
             return {"t": [], "x": [], "y": [], "z": [], "depth": None, "frame": "robot"}
-        time, path = averaged_path(self.timed.time, self.places())
-        if len(time) < _ENOUGH:
-            every = 1 + (len(self.timed.time) - 1) // _MOST_RAW
-            time, path = self.timed.time[::every], self.places()[::every]
+        time, path = self.timed.time, self.places()
+        if len(time) > _MOST_RAW:
+            time, path = averaged_path(time, path)
         depth = None
         if self.phantom is not None:
             depth = self.phantom.radius - self.phantom.geometry.facing(path)[0]

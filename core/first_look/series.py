@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ def extreme_rows(values: FloatArray, most: int) -> Rows:
     parts = max(1, (most - 2) // (2 * columns))
     edges = np.linspace(0, count, parts + 1).astype(int)
     rows = [0, count - 1]
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in pairwise(edges.tolist()):
         part = values[start:end]
         rows += (start + part.argmin(axis=0)).tolist() + (start + part.argmax(axis=0)).tolist()
     return np.unique(np.array(rows, dtype=np.int64))

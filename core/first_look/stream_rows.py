@@ -1,4 +1,4 @@
-"""Streams of a recording as rows of a table: rate, delay, role, gaps, and faults with their time."""
+"""Streams of a recording as rows of a table: rate, delay, role, gaps, and faults by time."""
 
 from __future__ import annotations
 

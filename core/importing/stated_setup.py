@@ -20,11 +20,12 @@ from palpate.importing.timed_recording import TimedRecording
 from palpate.importing.written_dataset import DatasetWriter
 from palpate.registration.robot.robot_statements import robot_fits, touched_centres
 
-__all__ = ["SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
+__all__ = ["SETUP_TABLES", "SURFACES", "check_setup", "found_phantom", "write_setup"]
 
 SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "splits")
 """Tables of dataset.toml that an import takes over."""
-_SURFACES = ("surface", "fixed_surface", "holder")
+SURFACES = ("surface", "fixed_surface", "holder")
+"""Keys of [phantom] that name files."""
 
 
 def check_setup(mapping: ImportMapping) -> None:
@@ -53,7 +54,7 @@ def write_setup(
     values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup, "splits": splits}
     writer.text("dataset.toml", toml_text(values))
     home = base / mapping.setup_folder
-    for key in _SURFACES:
+    for key in SURFACES:
         named = mapping.setup["phantom"].get(key, [])
         for file in [named] if isinstance(named, str) else named:
             writer.copied(file, home / file)
