@@ -184,7 +184,7 @@ export function createImport({ redraw, openDataset, opened }) {
         ...stated(view.setup),
         mapping: null,
         streams: null,
-        name: view.name,
+        name: view.name || null,
       });
     },
     cancelJob: () => {
@@ -261,7 +261,9 @@ export function createImport({ redraw, openDataset, opened }) {
       foundSequences(view.look?.recordings ?? []).filter((one) => one.recording === recording),
     /** @param {string} name */
     lookAtDataset: async (name) => {
-      const known = view.looks.find((one) => one.kind === "dataset" && one.name === name);
+      const known = view.looks.find(
+        ({ source }) => source?.kind === "dataset" && source.name === name,
+      );
       if (known) await show(known.id);
       else {
         actions.startOver();

@@ -1,6 +1,5 @@
 // First step of an import: recordings that are sent to the server or lie there, and earlier looks.
 import { element, icon } from "./dom.js";
-import { formatDateTime } from "./format.js";
 
 /** @import { ImportActions, ImportFile, ImportView } from "./types.js" */
 
@@ -208,7 +207,8 @@ function lookButton({ files }, actions) {
  * @returns {HTMLElement | null}
  */
 function earlier({ looks }, actions) {
-  if (!looks.length) return null;
+  const finished = looks.filter(({ source }) => source !== null).slice(0, 8);
+  if (!finished.length) return null;
   return element(
     "section",
     { "aria-label": "Earlier looks" },
@@ -216,8 +216,10 @@ function earlier({ looks }, actions) {
     element(
       "ul",
       { class: "import-files" },
-      looks.slice(0, 8).map(({ id, name, kind, created }) =>
-        element(
+      finished.map(({ id, source }) => {
+        const name = source?.name || id;
+        const from = (source?.files ?? []).map(lastPart).join(", ");
+        return element(
           "li",
           {},
           element(
@@ -228,32 +230,26 @@ function earlier({ looks }, actions) {
               {
                 class: "link name",
                 type: "button",
-                title: id,
+                title: from,
                 onclick: () => actions.openLook(id),
               },
-              name || id,
+              name,
             ),
-            element(
-              "span",
-              { class: "value" },
-              [kind === "dataset" ? "dataset" : "", created ? formatDateTime(created) : ""]
-                .filter(Boolean)
-                .join(" · "),
-            ),
+            element("span", { class: "value" }, source?.kind === "dataset" ? "dataset" : from),
             element(
               "button",
               {
                 class: "icon-button",
                 type: "button",
-                title: `Delete the look at ${name || id}`,
-                "aria-label": `Delete the look at ${name || id}`,
+                title: `Delete the look at ${name}`,
+                "aria-label": `Delete the look at ${name}`,
                 onclick: () => actions.removeLook(id),
               },
               icon("bin"),
             ),
           ),
-        ),
-      ),
+        );
+      }),
     ),
   );
 }

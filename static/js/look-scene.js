@@ -8,11 +8,19 @@ import { subscribe, state } from "./store.js";
 
 /** @type {Record<string, string>} */
 const LAYERS = {
-  raw: "Raw cloud",
-  cleaned: "Cleaned, by reason",
+  raw: "Raw",
+  cleaned: "Cleaned",
   tool: "Tool",
-  path: "Tool’s path",
-  surface: "Stated surface",
+  path: "Path",
+  surface: "Surface",
+};
+/** @type {Record<string, string>} */
+const MEANINGS = {
+  raw: "The cloud as it was measured",
+  cleaned: "The cloud in the colours of why points are kept or dropped",
+  tool: "The tool at this time",
+  path: "The path of the tool",
+  surface: "The phantom’s surface as it is stated",
 };
 /** @type {Record<string, string>} */
 const INK = { raw: "raw", cleaned: "measured", tool: "tool", path: "path", surface: "extended" };
@@ -159,7 +167,7 @@ function draw() {
             class: "chip",
             type: "button",
             disabled: why !== null,
-            title: why ?? label,
+            title: why ?? MEANINGS[layer],
             "aria-pressed": String(layers.has(layer)),
             "data-look-layer": layer,
             onclick: () => toggle(layer),

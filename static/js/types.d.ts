@@ -677,16 +677,16 @@ export interface LookRequest {
   setup_dataset?: string | null;
   mapping?: string | null;
   streams?: Partial<Record<StreamRole, string>> | null;
-  name?: string;
+  name?: string | null;
   dataset?: string;
 }
 
 /** A look as the list has it. */
 export interface LookEntry {
   id: string;
-  name: string;
-  kind: string;
-  created: number;
+  job: Pick<Job, "state"> | null;
+  /** What it is of; null before it is finished. */
+  source: { kind: string; files: string[]; name: string; recordings: number } | null;
 }
 
 /** What the scene of a look shows. */
