@@ -13,7 +13,7 @@ import pytest
 from bench_recording import BenchRecording, bench_setup
 from small_dataset import write_valid_dataset
 
-from palpate.app.client import Client
+from palpate.app.client import Client, JobError
 from palpate.app.settings import Settings
 from palpate.dataset import open_dataset
 
@@ -57,7 +57,13 @@ def look(client: httpx.Client, palpate: Client, bench: Path) -> dict[str, Any]:
 def test_an_upload_is_looked_at_with_a_stated_setup(
     client: httpx.Client, look: dict[str, Any]
 ) -> None:
-    assert look["source"] == {"kind": "recording", "files": ["files/bench.bag"], "name": "monday"}
+    assert look["source"] == {
+        "kind": "recording",
+        "files": ["files/bench.bag"],
+        "name": "monday",
+        "dataset": None,
+    }
+    assert look["request"]["files"][0].startswith("upload-") and look["request"]["setup"]
     assert look["setup_stated"] and len(look["recordings"][0]["sequences"]) == 4
     rows = client.get("/api/looks").raise_for_status().json()
     (row,) = (row for row in rows if row["id"] == look["id"])
@@ -93,14 +99,13 @@ def test_edited_sequences_with_their_splits_become_the_dataset(
 
 
 def test_a_sequence_of_an_unknown_recording_is_refused_by_the_job(
-    client: httpx.Client, look: dict[str, Any]
+    client: httpx.Client, palpate: Client, look: dict[str, Any]
 ) -> None:
     window = {"name": "a", "recording": "none", "start": 0.0, "end": 1.0, "kind": "", "split": ""}
     body = {"name": "never", "sequences": [window]}
     job = client.post(f"/api/looks/{look['id']}/import", json=body).json()
-    while (now := client.get(f"/api/jobs/{job['id']}").json())["state"] in ("queued", "running"):
-        pass
-    assert now["state"] == "failed" and "expected one of bench" in now["error"]["message"]
+    with pytest.raises(JobError, match="expected one of bench"):
+        palpate.wait(job["id"])
     bad = {"name": "never", "sequences": [{**window, "split": "some"}]}
     assert client.post(f"/api/looks/{look['id']}/import", json=bad).status_code == 422
 
@@ -181,10 +186,5 @@ def test_an_edited_mapping_reaches_nothing_beyond_the_look(
         mapping = found["mapping"].replace('touches = ""', f'touches = "{secret}"')
         body = {"name": "stolen", "mapping": mapping}
         job = client.post(f"/api/looks/{found['id']}/import", json=body).json()
-        while (now := client.get(f"/api/jobs/{job['id']}").json())["state"] in (
-            "queued",
-            "running",
-        ):
-            pass
-        assert now["state"] == "failed"
-        assert "secret.csv, which is not among the files" in now["error"]["message"]
+        with pytest.raises(JobError, match="which is not among the files"):
+            palpate.wait(job["id"])
