@@ -73,6 +73,7 @@ def _take(request: dict[str, Any], made: Path, report: Report) -> None:
         "recordings": len(found["recordings"]),
         "setup_stated": found["setup_stated"],
         "warnings": len(found["warnings"]),
+        "request": request["sent"],
     }
     (made / "source.json").write_text(json.dumps(source, ensure_ascii=False), encoding="utf-8")
 

@@ -36,7 +36,7 @@ class LookStore(ResultStore):
 
     def files(self, name: str) -> LookFiles:
         """The files of a finished look; raises Missing for another name."""
-        if self.result(name) is None:
+        if not self.has_begun(name) or not (self.folder / name / self.last).is_file():
             raise self.missing(name)
         return LookFiles(self.folder / name)
 

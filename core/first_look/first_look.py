@@ -249,6 +249,7 @@ class _Look:
                 "kind": "dataset" if self.of_dataset else "recording",
                 "files": [self._named(str(path)) for path in self.request.files],
                 "name": self.request.name,
+                "dataset": self.request.files[0].name if self.of_dataset else None,
             },
             "mapping": None if self.of_dataset else mapping_text(self._portable()),
             "setup_stated": dataset is not None,

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from palpate.app.api.incoming.imports import readable_path, refuse_taken
-from palpate.app.http_errors import Conflict
+from palpate.app.http_errors import Conflict, Missing
 from palpate.app.jobs.job_results import job_of, job_out, names_and_jobs
 from palpate.app.schemas import JobOut
 from palpate.app.server.pagination import RequestedPage, paginate
@@ -67,6 +67,7 @@ def start(body: LookBody, services: CurrentServices, key: IdempotencyKey = None)
     request: dict[str, Any] = {
         "runs": str(settings.runs),
         "most": settings.largest_dataset,
+        "sent": body.model_dump(mode="json"),
         **body.model_dump(include={"setup", "mapping", "streams"}),
     }
     if body.dataset is not None:
@@ -109,27 +110,29 @@ def listed(
     """
     store = LookStore(services.settings.runs)
     rows = paginate(names_and_jobs(store, services.jobs), page, response)
-    return [{"id": name, "job": job, "source": _source(store, name)} for name, job in rows]
+    return [{"id": name, "job": job, "source": _source(store, name)[0]} for name, job in rows]
 
 
-def _source(store: LookStore, name: str) -> dict[str, Any] | None:
+def _source(store: LookStore, name: str) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """What a look is of, and the request that was sent for it; None where that is not known."""
     try:
-        return store.request(name) if store.has_begun(name) else None
-    except DAMAGED:
-        return None
+        source = store.request(name)
+    except (*DAMAGED, Missing):
+        return None, None
+    return source, source.pop("request", None)
 
 
 @router.get("/{identity}")
 def one(identity: str, services: CurrentServices) -> dict[str, Any]:
-    """Streams, tool, forces, times of clouds, touches and sequences of one look; 409 while its job
-    is at work.
+    """Streams, tool, forces, times of clouds, touches and sequences of one look, and the `request`
+    for it as it was sent; 409 while its job is at work.
     """
     store = LookStore(services.settings.runs)
     found = store.result(identity)
     if found is None:
         _refuse_unfinished(identity, services)
         raise store.missing(identity)
-    return found
+    return {**found, "id": identity, "request": _source(store, identity)[1]}
 
 
 @router.delete("/{identity}", status_code=204)
