@@ -152,6 +152,15 @@ function unavailableReason(layer) {
   return null;
 }
 
+/**
+ * Return whether a layer is drawn; a cloud that cannot be cleaned is drawn as it was measured.
+ * @param {string} layer
+ * @returns {boolean}
+ */
+const isShown = (layer) =>
+  layers.has(layer) ||
+  (layer === "raw" && layers.has("cleaned") && unavailableReason("cleaned") !== null);
+
 function draw() {
   const views = { target: "reset", top: "top", front: "front", side: "side" };
   fill(
@@ -168,7 +177,7 @@ function draw() {
             type: "button",
             disabled: why !== null,
             title: why ?? MEANINGS[layer],
-            "aria-pressed": String(layers.has(layer)),
+            "aria-pressed": String(isShown(layer) && why === null),
             "data-look-layer": layer,
             onclick: () => toggle(layer),
           },

@@ -170,9 +170,9 @@ function drawTitle(pen, { scale, ink }, lane, { top, bottom }) {
   }
   pen.strokeStyle = ink("surface");
   pen.lineWidth = 4;
-  pen.strokeText(lane.title, scale.left + 5, top + 2);
+  pen.strokeText(lane.title, scale.left + 9, top + 2);
   pen.fillStyle = ink("text-2");
-  pen.fillText(lane.title, scale.left + 5, top + 2);
+  pen.fillText(lane.title, scale.left + 9, top + 2);
 }
 
 /**
