@@ -1,6 +1,7 @@
 // The scene of a look: its viewer, the layers above it, and the legend of why points are dropped.
 import { post, toError } from "./api.js";
 import { byId, element, fill, icon, swatch } from "./dom.js";
+import { drawReasons } from "./look-legend.js";
 import { pageId } from "./scene.js";
 import { subscribe, state } from "./store.js";
 
@@ -39,6 +40,8 @@ let layers = new Set(["cleaned", "tool", "path", "surface"]);
 let wanted = null;
 /** @type {LookScene | null} */
 let answer = null;
+/** @type {Set<string>} */
+const hidden = new Set(); // reasons whose points are not drawn
 let sending = false;
 let stale = false; // something else is wanted since the last request
 
@@ -116,6 +119,7 @@ async function send() {
       recording: recording.name,
       time,
       layers: Object.keys(LAYERS).filter((layer) => layers.has(layer)),
+      hidden: [...hidden],
     });
     note.textContent = "";
   } catch (problem) {
@@ -210,6 +214,17 @@ function draw() {
   drawLegend();
 }
 
+/** Draw the legend of the cloud that is shown. */
+function drawLegend() {
+  const reasons = (layers.has("cleaned") && answer?.points && wanted?.look.reasons) || [];
+  drawReasons(legend, reasons, answer?.counts ?? {}, hidden, (name) => {
+    if (hidden.has(name)) hidden.delete(name);
+    else hidden.add(name);
+    draw();
+    send();
+  });
+}
+
 /** @returns {string} */
 function noteText() {
   if (!wanted) return "Choose recordings on the right: what they hold appears here.";
@@ -233,49 +248,6 @@ function toggle(layer) {
     )?.focus();
   send();
 }
-
-/** Draw the reasons with the numbers of points of the cloud that is shown. */
-function drawLegend() {
-  const reasons = wanted?.look.reasons ?? [];
-  const counts = answer?.counts ?? {};
-  const shown = layers.has("cleaned") && reasons.length && answer?.points;
-  legend.hidden = !shown;
-  if (!shown) return;
-  fill(
-    legend,
-    element("div", { class: "title" }, "Points of this cloud"),
-    element(
-      "table",
-      { "aria-label": "Points of this cloud by reason" },
-      element(
-        "tbody",
-        {},
-        reasons
-          .filter(({ name }) => counts[name] || name === "kept")
-          .map(({ name, label, colour }) =>
-            element(
-              "tr",
-              {},
-              element(
-                "th",
-                { scope: "row" },
-                element("i", { class: "swatch", style: { background: cssColour(colour) } }),
-                ` ${label}`,
-              ),
-              element("td", { class: "number" }, String(counts[name] ?? 0)),
-            ),
-          ),
-      ),
-    ),
-  );
-}
-
-/**
- * @param {string | number[]} colour
- * @returns {string}
- */
-const cssColour = (colour) =>
-  typeof colour === "string" ? colour : `rgb(${colour.map((one) => Math.round(one)).join(" ")})`;
 
 /** Give the viewer the page's light or dark theme. */
 function applyTheme() {

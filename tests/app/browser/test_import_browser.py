@@ -180,3 +180,17 @@ def edit(panel: ImportPanel, found: dict[str, tuple[float, float]]) -> None:
     panel.page.until(lambda: "first" in panel.sequences())
     tab.locator("li.chosen select").nth(1).select_option("test")
     tab.wait_for_selector("li.chosen .tag.test")
+
+
+def test_what_cannot_be_looked_at_is_said_at_the_files(panel: ImportPanel, tmp_path: Path) -> None:
+    tab = panel.tab
+    panel.open()
+    (tmp_path / "empty.bag").touch()
+    tab.set_input_files("input[name=recordings]", tmp_path / "empty.bag")
+    tab.wait_for_selector("[data-file='empty.bag'][data-state=failed] >> text=is empty")
+    tab.click("[aria-label='Leave empty.bag out']")
+    tab.fill("input[name=path]", str(tmp_path / "none.bag"))
+    tab.get_by_role("button", name="Add", exact=True).click()
+    tab.click("text=Look at them")
+    tab.wait_for_selector("[data-problem=files] >> text=does not exist")
+    panel.page.trouble[:] = [text for text in panel.page.trouble if "422" not in text]
