@@ -31,7 +31,7 @@ PLACES = {
     "experiment": (4.0, 4.4),
     "synthetic": (0.9, 5.0),
     "effects": (3.0, 3.4),
-    "first_look": (5.6, 4.4),
+    "first_look": (6.3, 5.4),
     "consistency": (7.1, 4.4),
     "importing": (7.1, 2.4),
     "measurement": (5.9, 3.4),
