@@ -19,6 +19,7 @@ from palpate.foundation.progress import Report, part
 
 __all__ = ["import_look", "look"]
 
+SETUP = "dataset.toml"
 _MEMORY, _TIME = 2**31, 6 * 3600
 """Address space [bytes] and processor time [s] that reading recordings may take."""
 
@@ -59,7 +60,7 @@ def _take(request: dict[str, Any], made: Path, report: Report) -> None:
     found = take_look(
         LookRequest(
             files=places,
-            setup=_text(request.get("setup"), made / FILES / "dataset.toml"),
+            setup=_setup(request, made / FILES),
             mapping=_text(request.get("mapping"), made / "import.toml"),
             streams=dict(request.get("streams") or {}),
             name=str(request["name"]),
@@ -76,6 +77,15 @@ def _take(request: dict[str, Any], made: Path, report: Report) -> None:
         "request": request["sent"],
     }
     (made / "source.json").write_text(json.dumps(source, ensure_ascii=False), encoding="utf-8")
+
+
+def _setup(request: dict[str, Any], folder: Path) -> Path | None:
+    """Write the setup that was sent, or that of a dataset, into a folder; None without one."""
+    from palpate.importing.stated_setup import copied_setup
+
+    if request.get("setup_from"):
+        return copied_setup(Path(request["setup_from"]), folder)
+    return _text(request.get("setup"), folder / SETUP)
 
 
 def _text(text: str | None, place: Path) -> Path | None:
@@ -120,6 +130,8 @@ def _import(request: dict[str, Any], scratch: Path, whole: Path, report: Report)
     sources = [files.folder / one for one in found["source"]["files"]]
     if gone := [one.name for one in sources if not one.exists()]:
         raise Missing(f"{', '.join(gone)} is no longer there: look at the recordings again")
+    if (stated := files.folder / FILES / SETUP).exists():
+        sources.append(stated)
     mapping = bound_mapping(read_mapping(written), sources, files.folder)
     changes: dict[str, Any] = {"name": whole.name}
     if request.get("sequences") is not None:

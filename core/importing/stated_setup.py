@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.dataset.contact_points import Touches, read_touches, read_traces
+from palpate.dataset.files import read_toml
 from palpate.dataset.folder import Dataset, stated
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError, RegistrationError
@@ -20,12 +22,20 @@ from palpate.importing.timed_recording import TimedRecording
 from palpate.importing.written_dataset import DatasetWriter
 from palpate.registration.robot.robot_statements import robot_fits, touched_centres
 
-__all__ = ["SETUP_TABLES", "SURFACES", "check_setup", "found_phantom", "write_setup"]
+__all__ = [
+    "SETUP_TABLES",
+    "SURFACES",
+    "check_setup",
+    "copied_setup",
+    "found_phantom",
+    "write_setup",
+]
 
 SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "splits")
 """Tables of dataset.toml that an import takes over."""
 SURFACES = ("surface", "fixed_surface", "holder")
 """Keys of [phantom] that name files."""
+_LIMIT = 2**20
 
 
 def check_setup(mapping: ImportMapping) -> None:
@@ -45,6 +55,33 @@ def check_setup(mapping: ImportMapping) -> None:
                 f"setup.{name} is no table of dataset.toml; expected {', '.join(SETUP_TABLES)}",
                 key=f"setup.{name}",
             )
+
+
+def copied_setup(dataset: Path, folder: Path) -> Path:
+    """Copy what a dataset states, with its surfaces and without its splits; returns the new
+    dataset.toml.
+
+    Raises DatasetError where its dataset.toml cannot be read, or names a file that it lacks.
+    """
+    values = read_toml(dataset, "dataset.toml", _LIMIT)
+    kept = {key: values[key] for key in SETUP_TABLES if key in values and key != "splits"}
+    for key in SURFACES:
+        named = kept.get("phantom", {}).get(key, [])
+        for file in [named] if isinstance(named, str) else named:
+            source, place = (dataset / file).resolve(), folder / file
+            if not source.is_relative_to(dataset.resolve()) or not source.is_file():
+                raise DatasetError(
+                    f"dataset.toml: phantom.{key} = {file!r} is no file of the dataset "
+                    f"{dataset.name}: take the setup of another one",
+                    file="dataset.toml",
+                    key=f"phantom.{key}",
+                )
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, place)
+    written = folder / "dataset.toml"
+    written.unlink(missing_ok=True)
+    written.write_text(toml_text(kept), encoding="utf-8")
+    return written
 
 
 def write_setup(

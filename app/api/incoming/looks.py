@@ -30,8 +30,9 @@ class LookBody(BaseModel):
     """Recordings to look at, with what is stated about them; or a dataset by its name.
 
     A file is the token of an upload, or a path on the server's disk from an allowed place. `setup`
-    is the text of a dataset.toml, `mapping` that of an import.toml, whose files are looked for
-    among these by their names. `streams` names streams by role; an empty name is for none.
+    is the text of a dataset.toml, `setup_dataset` the name of a dataset whose setup is taken.
+    `mapping` is the text of an import.toml, whose files are looked for among these by their names.
+    `streams` names streams by role; an empty name is for none.
     """
 
     model_config = ConfigDict(
@@ -43,6 +44,7 @@ class LookBody(BaseModel):
     files: list[str] = Field(default_factory=list, max_length=1000)
     dataset: str | None = Field(default=None, max_length=255)
     setup: str | None = Field(default=None, max_length=_LONGEST_TEXT)
+    setup_dataset: str | None = Field(default=None, max_length=255)
     mapping: str | None = Field(default=None, max_length=_LONGEST_TEXT)
     streams: dict[Literal["pose", "cloud", "camera", "wrench"], str] | None = None
     name: str | None = Field(default=None, max_length=64)
@@ -71,7 +73,8 @@ def start(body: LookBody, services: CurrentServices, key: IdempotencyKey = None)
         **body.model_dump(include={"setup", "mapping", "streams"}),
     }
     if body.dataset is not None:
-        if body.files or body.setup is not None or body.mapping is not None:
+        beside = (body.setup, body.setup_dataset, body.mapping)
+        if body.files or any(one is not None for one in beside):
             raise DatasetError(
                 "a dataset has its setup and sequences; expected it alone, or files", key="dataset"
             )
@@ -81,12 +84,23 @@ def start(body: LookBody, services: CurrentServices, key: IdempotencyKey = None)
         if not body.files:
             raise DatasetError("no file is named; expected recordings, or a dataset", key="files")
         named = [_place(file, services) for file in body.files]
+        if body.setup_dataset is not None:
+            request["setup_from"] = str(_setup_folder(body, services))
         request |= {
             "files": [str(path) for path, _ in named],
             "uploads": [str(path) for path, is_upload in named if is_upload],
             "name": body.name or named[0][0].stem,
         }
     return job_out(services.jobs.submit("look", request, "look", key))
+
+
+def _setup_folder(body: LookBody, services: Services) -> Path:
+    """Folder of the dataset whose setup is taken."""
+    if body.setup is not None:
+        raise DatasetError(
+            "the setup is stated twice; expected setup or setup_dataset", key="setup"
+        )
+    return services.library.path(str(body.setup_dataset))
 
 
 def _place(file: str, services: Services) -> tuple[Path, bool]:

@@ -11,6 +11,7 @@ from typing import Any
 import httpx
 import pytest
 from bench_recording import BenchRecording, bench_setup
+from shapes import box_surface, write_felt_shape
 from small_dataset import write_valid_dataset
 
 from palpate.app.client import Client, JobError
@@ -188,3 +189,22 @@ def test_a_path_that_may_not_be_imported_from_is_not_looked_at(
     with serve(settings) as client:
         refused = client.post("/api/looks", json={"files": [str(bench / "bench.bag")]})
     assert refused.status_code == 422 and "--import-from" in refused.json()["message"]
+
+
+def test_the_setup_of_a_dataset_is_taken_with_its_surface(
+    client: httpx.Client, palpate: Client, shared_place: Any, bench: Path
+) -> None:
+    felt = shared_place.datasets / "felt"
+    felt.mkdir()
+    write_felt_shape(felt, *box_surface((0.06, 0.04, 0.03)))
+    surface = felt / "phantom.stl"
+    token = palpate.upload(bench / "bench.bag")
+    body = {"files": [token], "setup_dataset": "felt", "name": "as-felt"}
+    found = taken(palpate, body)
+    assert found["setup_stated"] and surface.name in found["mapping"]
+    assert "splits" not in found["mapping"]
+    files = shared_place.runs / "looks" / found["id"] / "files"
+    assert (files / surface.name).read_bytes() == surface.read_bytes()
+    twice = client.post("/api/looks", json={**body, "setup": "name = 'a'"})
+    assert (twice.status_code, twice.json()["where"]["key"]) == (422, "setup")
+    assert client.post("/api/looks", json={**body, "setup_dataset": "none"}).status_code == 404
