@@ -25,12 +25,15 @@ from palpate.first_look.staged_dataset import (
     staged_dataset,
 )
 from palpate.first_look.stream_rows import read_tracks, stream_rows, times_of
+from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError, PalpateError
 from palpate.foundation.progress import Report, part, silent
+from palpate.importing.clocks.stream_times import StreamTimes
 from palpate.importing.cutting.pushes import LocatedPhantom
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.import_recording import PROVISIONAL_SPLITS, chosen_splits, proposed_windows
 from palpate.importing.mapping_file import mapping_text
+from palpate.importing.proposed_mapping import no_pose
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ImportMapping, SequenceWindow
 from palpate.importing.stated_setup import check_setup, found_phantom, write_setup
@@ -86,6 +89,7 @@ class _Look:
     writer: DatasetWriter
     error: PalpateError | None = None
     streams: list[list[dict[str, Any]]] = field(default_factory=list)
+    spans: list[FloatArray] = field(default_factory=list)
 
     @property
     def of_dataset(self) -> bool:
@@ -141,7 +145,10 @@ class _Look:
             tracks = read_tracks(one, share)
             times = times_of(tracks, self.mapping)
             self.streams.append(stream_rows(one, tracks, times, self.mapping))
+            self.spans.append(_span(times))
             try:
+                if not self.mapping.streams.pose:
+                    raise no_pose(one.streams())
                 found.append(on_one_clock(one, tracks, self.mapping, self.notes))
             except DatasetError as error:
                 self.error = self.error or error
@@ -214,7 +221,7 @@ class _Look:
             every = 1 + (len(timed.pose_times) - 1) // MOST_PLACES
             self.files.write_path(at, LookPath(timed.time[::every], one.places()[::every]))
         ends = [times[[0, -1]] for times in (timed.pose_times, timed.cloud_times) if len(times)]
-        span = np.concatenate(ends) / 1e9 if ends else np.zeros(1)
+        span = np.concatenate(ends) / 1e9 if ends else self.spans[at]
         return {
             "name": timed.name,
             "start": round(float(span.min()), 6),
@@ -289,6 +296,12 @@ class _Look:
             for warning in one.warnings():
                 self.notes.warn(warning)
         return self.notes.warnings
+
+
+def _span(times: dict[str, StreamTimes]) -> FloatArray:
+    """First and last time [s] of any stream; zeros without any."""
+    ends = [one.times[[0, -1]] for one in times.values() if len(one.times)]
+    return np.concatenate(ends) / 1e9 if ends else np.zeros(1)
 
 
 def _empty(root: Path, timed: TimedRecording) -> Sequence:

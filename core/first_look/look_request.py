@@ -14,7 +14,7 @@ from palpate.importing.rules import ImportMapping
 from palpate.importing.stated_setup import SURFACES
 from palpate.importing.survey import Survey, read_setup, survey
 
-__all__ = ["LookRequest", "bound_mapping", "is_dataset", "opened_sources"]
+__all__ = ["LookRequest", "bound_mapping", "is_dataset", "named_files", "opened_sources"]
 
 _BESIDE = (".stl", ".obj", ".ply", ".pcd", ".png", ".npy", ".npz", ".json", ".xyz")
 """Endings of files that are no recordings by themselves."""
@@ -91,6 +91,23 @@ def opened_sources(
     return surveyed.recordings, _with_streams(mapping, request.streams)
 
 
+def named_files(mapping: Path) -> tuple[ImportMapping, list[Path]]:
+    """Read an import.toml that stands alone: with whole paths, and the files that it names."""
+    home = mapping.resolve().parent
+    found = bound_mapping(read_mapping(mapping), (), home)
+    files = [file for one in found.recordings for file in one.files]
+    files += [file for file in (found.touches, found.traces, found.rest.file) if file]
+    surfaces = [Path(found.setup_folder) / name for name in _surfaces(found)]
+    return found, [*map(Path, files), *(one for one in surfaces if one.is_file())]
+
+
+def _surfaces(mapping: ImportMapping) -> list[str]:
+    """Files that the phantom's statement names."""
+    phantom = mapping.setup.get("phantom", {})
+    named = [phantom.get(key, []) for key in SURFACES] if isinstance(phantom, dict) else []
+    return [str(one) for some in named for one in ([some] if isinstance(some, str) else some)]
+
+
 def _recorded(files: Sequence[Path], notes: ImportNotes) -> list[Path]:
     """The files without those that are no recordings by themselves, such as a surface that the
     setup names.
@@ -107,13 +124,24 @@ def _recorded(files: Sequence[Path], notes: ImportNotes) -> list[Path]:
     return list(files)
 
 
+def _alike(file: str, places: Sequence[Path]) -> list[Path]:
+    """The places of this file's name whose folders agree with it the farthest."""
+    parts = Path(file.replace("\\", "/")).parts[::-1]
+
+    def agreeing(place: Path) -> int:
+        pairs = zip(parts, place.parts[::-1], strict=False)
+        return next((at for at, (one, other) in enumerate(pairs) if one != other), len(parts))
+
+    named = {place: agreeing(place) for place in places if place.name == parts[0]}
+    most = max(named.values(), default=0)
+    return [place for place, alike in named.items() if alike == most]
+
+
 def _with_surfaces(mapping: ImportMapping, files: Sequence[Path]) -> ImportMapping:
     """The mapping with the folder in which the surfaces that the setup names lie: beside the setup,
     else beside a recording.
     """
-    phantom = mapping.setup.get("phantom", {})
-    named = [phantom.get(key, []) for key in SURFACES] if isinstance(phantom, dict) else []
-    names = [str(one) for some in named for one in ([some] if isinstance(some, str) else some)]
+    names = _surfaces(mapping)
     homes = [Path(mapping.setup_folder), *(file.resolve().parent for file in files)]
     for home in homes if names else ():
         if all((home / name).is_file() for name in names):
@@ -133,7 +161,7 @@ def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> 
     Raises DatasetError for a file that is not among the given ones.
     """
     sources = [path.resolve() for path in files]
-    places = {path.name: path.resolve() for path in _spread(sources)}
+    places = _spread(sources)
 
     def bound(file: str, key: str) -> str:
         if not file:
@@ -141,15 +169,17 @@ def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> 
         found = (home / file).resolve()
         if not files or any(found.is_relative_to(one) for one in sources):
             return str(found)
-        name = Path(file).name
-        if name not in places:
+        fitting = _alike(file, places)
+        if len(fitting) != 1:
+            names = ", ".join(sorted({path.name for path in places})[:20])
+            many = "is not" if not fitting else f"is {len(fitting)} times"
             raise DatasetError(
-                f"{key} names {name}, which is not among the files; there are "
-                f"{', '.join(sorted(places)[:20])}: bring it, or correct {key}",
+                f"{key} names {Path(file).name}, which {many} among the files; expected it once, "
+                f"there are {names}: bring it, or correct {key}",
                 key=key,
-                value=name,
+                value=Path(file).name,
             )
-        return str(places[name])
+        return str(fitting[0])
 
     recordings = tuple(
         one.model_copy(update={"files": tuple(bound(file, "recordings") for file in one.files)})
@@ -157,7 +187,7 @@ def bound_mapping(mapping: ImportMapping, files: Sequence[Path], home: Path) -> 
     )
     folder = (home / mapping.setup_folder).resolve()
     if files and not any(one.parent == folder or folder.is_relative_to(one) for one in sources):
-        stated = (path.parent for name, path in places.items() if name == "dataset.toml")
+        stated = (path.parent for path in places if path.name == "dataset.toml")
         folder = next(stated, sources[0].parent)
     return mapping.model_copy(
         update={

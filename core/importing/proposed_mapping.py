@@ -21,7 +21,7 @@ from palpate.importing.rules import (
 )
 from palpate.importing.stream import Stream
 
-__all__ = ["proposed_mapping", "recording_name"]
+__all__ = ["no_pose", "proposed_mapping", "recording_name"]
 
 _POSES = (
     r"(?<!local/)\bmeasured_cp$",
@@ -70,11 +70,12 @@ def proposed_mapping(
     wrench = _stated(streams, topics.get("wrench")) or _best(streams, "wrench", _WRENCHES)
     rules = WrenchRules() if wrench is None else _wrench_rules(wrench, pose, notes)
     cut = len(recordings) == 1
-    notes.decide(
-        "one recording: it is cut into pushes"
-        if cut
-        else f"{len(recordings)} recordings: each is one sequence"
-    )
+    if pose is not None:
+        notes.decide(
+            "one recording: it is cut into pushes"
+            if cut
+            else f"{len(recordings)} recordings: each is one sequence"
+        )
     return ImportMapping(
         name=name,
         recordings=tuple(
@@ -110,16 +111,21 @@ def _stated(streams: Sequence[Stream], name: str | None) -> Stream | None:
 
 def _pose(streams: Sequence[Stream], needed: bool) -> Stream | None:
     found = _best(streams, "pose", _POSES)
-    if found is not None or not needed:
-        return found
+    if found is None and needed:
+        raise no_pose(streams)
+    return found
+
+
+def no_pose(streams: Sequence[Stream]) -> DatasetError:
+    """The error for recordings without the pose of a tool."""
     if any(one.kind == "joints" for one in streams):
         names = ", ".join(dict.fromkeys(one.name for one in streams if one.kind == "joints"))
         text = (
             f"only joint states are there ({names}), which need the robot's kinematics; expected "
             "the pose of the tool: record measured_cp beside them"
         )
-        raise DatasetError(text, key="streams.pose")
-    raise DatasetError(
+        return DatasetError(text, key="streams.pose")
+    return DatasetError(
         f"no stream is known as the pose of a tool; there are {_listing(streams)}: name it by "
         "--pose, or in import.toml",
         key="streams.pose",

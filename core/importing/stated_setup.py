@@ -77,6 +77,7 @@ def copied_setup(dataset: Path, folder: Path) -> Path:
                     key=f"phantom.{key}",
                 )
             place.parent.mkdir(parents=True, exist_ok=True)
+            place.unlink(missing_ok=True)
             shutil.copyfile(source, place)
     written = folder / "dataset.toml"
     written.unlink(missing_ok=True)

@@ -128,7 +128,7 @@ def listed(
 
 
 def _source(store: LookStore, name: str) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """What a look is of, and the request that was sent for it; None where that is not known."""
+    """Source of a look, and the request that was sent for it; None where that is not known."""
     try:
         source = store.request(name)
     except (*DAMAGED, Missing):

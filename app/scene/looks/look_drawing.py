@@ -95,7 +95,7 @@ class LookDrawing:
     def eye(self) -> FloatArray:
         """Place (3,) [m] of the depth camera, frame of the scene."""
         if self.look["eye"] is not None and self.look["frame"] == "phantom":
-            return np.array(self.look["eye"])
+            return np.array(self.look["eye"], dtype=float)
         return np.asarray(self.upright.apply(np.zeros(3))) + np.array([0.0, -1.0, 0.0])
 
     @cached_property
@@ -189,7 +189,8 @@ class LookDrawing:
 
     def _off(self, frame: str) -> bool:
         """Whether things of a frame, or the surface, cannot be drawn in that of the scene."""
-        return {"surface": "phantom"}.get(frame, frame) != self.look["frame"]
+        own: str = self.look["frame"]
+        return {"surface": "phantom"}.get(frame, frame) != own
 
     def _number(self, name: str | None) -> int:
         names = [one["name"] for one in self.look["recordings"]]

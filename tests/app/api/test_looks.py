@@ -39,20 +39,18 @@ def uploaded(client: httpx.Client, name: str, content: bytes) -> str:
     return str(answer.json()["file"])
 
 
-def taken(client: httpx.Client, palpate: Client, body: dict[str, Any]) -> dict[str, Any]:
+def taken(palpate: Client, body: dict[str, Any]) -> dict[str, Any]:
     """The look that a request gives."""
-    answer = client.post("/api/looks", json=body)
-    assert answer.status_code == 202, answer.text
-    job = palpate.wait(answer.json()["id"])
+    job = palpate.wait(palpate.look(**body)["id"])
     assert job["kind"] == "look" and job["result"] == {"look": job["id"]}
-    return {"id": job["id"], **client.get(f"/api/looks/{job['id']}").raise_for_status().json()}
+    return palpate.look_result(job["id"])
 
 
 @pytest.fixture(scope="module")
-def look(client: httpx.Client, palpate: Client, bench: Path) -> dict[str, Any]:
-    token = uploaded(client, "bench.bag", (bench / "bench.bag").read_bytes())
+def look(palpate: Client, bench: Path) -> dict[str, Any]:
+    token = palpate.upload(bench / "bench.bag")
     setup = (bench / "dataset.toml").read_text()
-    return taken(client, palpate, {"files": [token], "setup": setup, "name": "monday"})
+    return taken(palpate, {"files": [token], "setup": setup, "name": "monday"})
 
 
 def test_an_upload_is_looked_at_with_a_stated_setup(
@@ -82,9 +80,7 @@ def test_edited_sequences_with_their_splits_become_the_dataset(
     ]
     mapping = look["mapping"].replace('[wrench]\nframe = ""', '[wrench]\nframe = "tool"')
     body = {"name": "monday-block", "mapping": mapping, "sequences": sequences}
-    answer = client.post(f"/api/looks/{look['id']}/import", json=body)
-    assert answer.status_code == 202, answer.text
-    job = palpate.wait(answer.json()["id"])
+    job = palpate.wait(palpate.import_look(look["id"], **body)["id"])
     assert job["kind"] == "import" and job["dataset"] == "monday-block"
     result = job["result"]
     assert (result["dataset"], result["sequences"]) == ("monday-block", 2)
@@ -111,6 +107,7 @@ def test_a_sequence_of_an_unknown_recording_is_refused_by_the_job(
     assert client.post(f"/api/looks/{look['id']}/import", json=bad).status_code == 422
 
 
+@pytest.mark.more
 def test_a_packed_folder_and_a_dataset_are_looked_at(
     client: httpx.Client, palpate: Client, tmp_path: Path
 ) -> None:
@@ -118,8 +115,8 @@ def test_a_packed_folder_and_a_dataset_are_looked_at(
     with zipfile.ZipFile(data, "w") as archive:
         for path in sorted(folder.rglob("*")):
             archive.write(path, f"block/{path.relative_to(folder)}")
-    packed = taken(client, palpate, {"files": [uploaded(client, "block.zip", data.getvalue())]})
-    named = taken(client, palpate, {"dataset": "small"})
+    packed = taken(palpate, {"files": [uploaded(client, "block.zip", data.getvalue())]})
+    named = taken(palpate, {"dataset": "small"})
     for one in (packed, named):
         assert [row["name"] for row in one["recordings"]] == ["drag-01", "poke-01"]
         assert one["source"]["kind"] == "dataset" and one["cleaned"]
@@ -127,11 +124,12 @@ def test_a_packed_folder_and_a_dataset_are_looked_at(
     assert answer.status_code == 409 and "there already" in answer.json()["message"]
 
 
+@pytest.mark.more
 def test_a_look_is_deleted_with_the_recording_that_was_uploaded_for_it(
     client: httpx.Client, palpate: Client, shared_place: Any, bench: Path
 ) -> None:
     token = uploaded(client, "other.bag", (bench / "bench.bag").read_bytes())
-    found = taken(client, palpate, {"files": [token]})
+    found = taken(palpate, {"files": [token]})
     folder = shared_place.runs / "looks" / found["id"]
     assert (folder / "files" / "other.bag").is_file()
     assert client.delete(f"/api/looks/{found['id']}").status_code == 204
@@ -172,23 +170,25 @@ def test_an_empty_upload_leaves_nothing(client: httpx.Client, shared_place: Any)
 
 
 def test_an_edited_mapping_reaches_nothing_beyond_the_look(
-    serve: Any, place: Any, bench: Path, tmp_path: Path
+    palpate: Client, look: dict[str, Any], tmp_path: Path
 ) -> None:
     secret = tmp_path / "secret.csv"
     secret.write_text("landmark,x,y,z\n")
+    mapping = look["mapping"].replace('touches = ""', f'touches = "{secret}"')
+    job = palpate.import_look(look["id"], "stolen", mapping=mapping)
+    with pytest.raises(JobError, match="which is not among the files"):
+        palpate.wait(job["id"])
+
+
+def test_a_path_that_may_not_be_imported_from_is_not_looked_at(
+    serve: Any, place: Any, bench: Path, tmp_path: Path
+) -> None:
     settings = Settings(
         runs=place.runs, datasets=place.datasets, preload=(), import_from=(tmp_path / "open",)
     )
-    with serve(settings) as client, Client(str(client.base_url)) as palpate:
+    with serve(settings) as client:
         refused = client.post("/api/looks", json={"files": [str(bench / "bench.bag")]})
-        assert refused.status_code == 422 and "--import-from" in refused.json()["message"]
-        token = uploaded(client, "bench.bag", (bench / "bench.bag").read_bytes())
-        found = taken(client, palpate, {"files": [token]})
-        mapping = found["mapping"].replace('touches = ""', f'touches = "{secret}"')
-        body = {"name": "stolen", "mapping": mapping}
-        job = client.post(f"/api/looks/{found['id']}/import", json=body).json()
-        with pytest.raises(JobError, match="which is not among the files"):
-            palpate.wait(job["id"])
+    assert refused.status_code == 422 and "--import-from" in refused.json()["message"]
 
 
 def test_the_setup_of_a_dataset_is_taken_with_its_surface(
@@ -198,9 +198,9 @@ def test_the_setup_of_a_dataset_is_taken_with_its_surface(
     felt.mkdir()
     write_felt_shape(felt, *box_surface((0.06, 0.04, 0.03)))
     surface = felt / "phantom.stl"
-    token = uploaded(client, "bench.bag", (bench / "bench.bag").read_bytes())
+    token = palpate.upload(bench / "bench.bag")
     body = {"files": [token], "setup_dataset": "felt", "name": "as-felt"}
-    found = taken(client, palpate, body)
+    found = taken(palpate, body)
     assert found["setup_stated"] and surface.name in found["mapping"]
     assert "splits" not in found["mapping"]
     files = shared_place.runs / "looks" / found["id"] / "files"

@@ -114,7 +114,8 @@ def test_a_recording_without_poses_shows_its_clouds_and_says_what_is_missing(
             bag.cloud("/camera/points", stamp, stamp + 10**6, bench.image(number), "camera")
     look = take_look(LookRequest(files=(tmp_path / "clouds.bag",)), tmp_path / "look")
     (one,) = look["recordings"]
-    assert "no samples of" in look["error"]["message"]
+    assert "no stream is known as the pose" in look["error"]["message"]
+    assert look["error"]["where"] == {"key": "streams.pose"}
     assert one["clouds"]["shown"] == [0, 1, 2, 3, 4, 5] and one["tool"]["t"] == []
     assert (one["start"], one["end"]) == (100.0, 105.0)
     assert one["sequences"] == [] and one["force"] is None
