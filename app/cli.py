@@ -41,6 +41,7 @@ app = typer.Typer(
 app.command()(demo.demo)
 app.command()(data.check)
 app.command("import")(importing.import_)
+app.command()(importing.look)
 app.command()(surface.surface)
 app.command()(data.register)
 app.command()(data.replay)

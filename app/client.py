@@ -107,6 +107,35 @@ class Client:
         """Queue the import of a folder on the server's own disk."""
         return self._ask("/imports/folder", {"folder": folder, "name": name}, key)
 
+    def upload(self, file: Path) -> str:
+        """Send one file of a recording; the token stands for it in a look."""
+        headers = {"content-type": "application/octet-stream"}
+        with Path(file).open("rb") as content:
+            answer = self._http.post(
+                "/uploads", params={"file": Path(file).name}, content=content, headers=headers
+            )
+        return str(self._answer(answer)["file"])
+
+    def look(
+        self, files: Sequence[str] = (), key: str | None = None, **further: Any
+    ) -> dict[str, Any]:
+        """Queue a look at files (tokens of uploads, or paths on the server's disk), or at
+        `dataset`; `further` as in POST /api/looks. The id of the job will be the look's.
+        """
+        return self._ask("/looks", {"files": list(files), **further}, key)
+
+    def look_result(self, identity: str) -> dict[str, Any]:
+        """A finished look."""
+        return dict(self._get(f"/looks/{identity}"))
+
+    def import_look(
+        self, look: str, name: str, key: str | None = None, **edited: Any
+    ) -> dict[str, Any]:
+        """Queue the import of a look's recordings as a dataset; `edited` is its mapping or its
+        sequences, as in POST /api/looks/{id}/import.
+        """
+        return self._ask(f"/looks/{look}/import", {"name": name, **edited}, key)
+
     def registrations(self, dataset: str) -> list[str]:
         """Names of the accepted registrations of a dataset."""
         return list(self._get(f"/datasets/{dataset}/registrations")["registrations"])

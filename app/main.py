@@ -31,6 +31,7 @@ from palpate.app.api import (
     trainings,
     whatif,
 )
+from palpate.app.api.incoming import imports, looking, looks, uploads
 from palpate.app.http_errors import Missing, NoSpace, as_dict, disk_is_full, status_code
 from palpate.app.jobs.tasks import TARGETS
 from palpate.app.schemas import PROBLEMS, Health
@@ -56,6 +57,10 @@ GET /api/jobs/events, have its progress.
 
 MODULES = (
     datasets,
+    imports,
+    uploads,
+    looks,
+    looking,
     disk_space,
     replays_and_exports,
     registrations,

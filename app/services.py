@@ -15,6 +15,7 @@ from palpate.app.http_errors import NoSpace
 from palpate.app.jobs.job_queue import JobQueue
 from palpate.app.jobs.job_records import Job
 from palpate.app.jobs.whatif_process import FrameSolver, InteractiveSolver
+from palpate.app.scene.looks.look_scenes import LookScenes
 from palpate.app.scene.manual_registration import ManualRegistrations
 from palpate.app.scene.page_session import Sessions
 from palpate.app.scene.phantom import Phantoms
@@ -23,6 +24,7 @@ from palpate.app.settings import Settings
 from palpate.app.storage.dataset_import import STAGING
 from palpate.app.storage.dataset_library import Library
 from palpate.app.storage.disk_usage import Disk
+from palpate.app.storage.look_store import LookStore
 from palpate.app.storage.registration_store import RegistrationStore
 from palpate.app.storage.run_store import RunStore
 from palpate.app.storage.stored_results import StoredResults
@@ -47,6 +49,7 @@ class Services:
     sessions: Sessions
     viewer: ViewerServer
     manual_registrations: ManualRegistrations
+    look_scenes: LookScenes
     frame_solver: FrameSolver
     interactive_solver: InteractiveSolver
     arriving: list[str]
@@ -63,7 +66,7 @@ class Services:
             ManualRegistrations(Phantoms(library).open),
             Disk(settings.runs, settings.disk_limit),
         )
-        arriving: list[str] = []
+        look_scenes, arriving = LookScenes(LookStore(settings.runs)), list[str]()
         return cls(
             settings=settings,
             library=library,
@@ -81,10 +84,12 @@ class Services:
             sessions=sessions,
             viewer=ViewerServer(
                 SceneListener(sessions.join, sessions.leave),
+                SceneListener(look_scenes.join, look_scenes.leave),
                 SceneListener(manual_registrations.join, manual_registrations.leave),
                 manual_registrations.click,
             ),
             manual_registrations=manual_registrations,
+            look_scenes=look_scenes,
             frame_solver=FrameSolver(),
             interactive_solver=InteractiveSolver(),
             arriving=arriving,
@@ -142,12 +147,18 @@ class Services:
 
 
 def _awaited(jobs: Iterable[Job], arriving: Iterable[str]) -> frozenset[str]:
-    imports = [
+    needing = [
         job
         for job in jobs
-        if job.kind == "import" and (job.state.can_be_retried or not job.state.is_finished)
+        if job.kind in ("import", "look")
+        and (job.state.can_be_retried or not job.state.is_finished)
     ]
-    return frozenset([*arriving, *(str(job.request.get("archive")) for job in imports)])
+    files = (
+        str(file)
+        for job in needing
+        for file in (job.request.get("archive"), *job.request.get("uploads", ()))
+    )
+    return frozenset([*arriving, *files])
 
 
 def _tidy(disk: Disk, jobs: Iterable[Job], arriving: Iterable[str]) -> str:

@@ -39,8 +39,8 @@ def empty(services: CurrentServices) -> dict[str, Any]:
 
 @router.delete("/{kind}/{name}")
 def delete(kind: str, name: str, services: CurrentServices) -> dict[str, Any]:
-    """Delete a run, sweep, training or evaluation for good; the answer is the usage without it.
-    409 while its job is at work.
+    """Delete a run, sweep, training, evaluation or look for good; the answer is the usage without
+    it. 409 while its job is at work.
     """
     results = StoredResults(services.settings.runs)
     store = results.store(kind)

@@ -14,6 +14,7 @@ from palpate.foundation.arrays import FloatArray
 
 __all__ = [
     "CloudFigure",
+    "ColourArray",
     "Figure",
     "LabelFigure",
     "LinesFigure",
@@ -25,6 +26,7 @@ __all__ = [
 ]
 
 PointArray = np.ndarray[Any, np.dtype[np.float32]]
+ColourArray = np.ndarray[Any, np.dtype[np.uint8]]
 Rgb = tuple[int, int, int]
 Place = tuple[float, float, float]
 HERE: Place = (0.0, 0.0, 0.0)
@@ -46,10 +48,13 @@ class SurfaceFigure:
 
 @dataclass(frozen=True, eq=False)
 class CloudFigure:
-    """Points (n, 3) [m]."""
+    """Points (n, 3) [m] of one colour, or with a colour (n, 3) for each; `size` of a point [m], as
+    usual if None.
+    """
 
     points: PointArray
-    colour: Rgb
+    colour: Rgb | ColourArray
+    size: float | None = None
     at: Place = HERE
 
 
@@ -60,7 +65,7 @@ class LinesFigure:
     """
 
     segments: PointArray
-    colour: Rgb | np.ndarray[Any, np.dtype[np.uint8]]
+    colour: Rgb | ColourArray
     width: float = 1.2
     at: Place = HERE
 

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from palpate.app.jobs.look_jobs import import_look
 from palpate.app.storage.archive import copy_folder, dataset_root, unpack
 from palpate.app.storage.dataset_import import STAGING, check_name, note_placing, was_placed
 from palpate.app.storage.held_folder import held_folder
@@ -23,11 +24,13 @@ _MEMORY, _TIME = 2**29, 3600
 
 def import_dataset(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """Unpack `request["archive"]`, or copy `request["folder"]`, check every file, and make it the
-    dataset `name`.
+    dataset `name`; or import the recordings of `request["look"]`.
 
     The archive stays until it is accepted or refused, so that an interrupted import can be
     repeated. Where it was interrupted after its dataset was in place, the repeated one says so.
     """
+    if request.get("look"):
+        return import_look(request, report)
     datasets, name = Path(request["datasets"]), str(request["name"])
     scratch = Path(request["scratch"]).name
     note = datasets / STAGING / f"{scratch}.placed"

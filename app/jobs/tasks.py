@@ -26,6 +26,7 @@ TARGETS = {
     "sweep": "palpate.app.jobs.tasks:sweep",
     "training": "palpate.app.jobs.tasks:train",
     "import": "palpate.app.jobs.import_dataset:import_dataset",
+    "look": "palpate.app.jobs.look_jobs:look",
     "registration": "palpate.app.jobs.short_tasks:register",
     "replay": "palpate.app.jobs.short_tasks:replay",
     "export": "palpate.app.jobs.short_tasks:export",

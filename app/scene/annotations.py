@@ -277,13 +277,14 @@ def _span(parameter: dict[str, Any]) -> tuple[float, float, float]:
     return low, value, high
 
 
-def path_lines(layer: ModelLayer, frame: int) -> dict[str, Figure]:
-    """Path of the tool's centre through the sequence: dark until this frame, light after it."""
-    places = layer.path
+def path_lines(places: FloatArray, reached: int) -> dict[str, Figure]:
+    """Path of the tool's centre through places (n, 3) [m]: dark up to the segment that is reached,
+    light after it.
+    """
     if len(places) < 2:
         return {}
     segments = np.stack([places[:-1], places[1:]], axis=1)
-    shades = np.where((np.arange(len(segments)) < frame)[:, None, None], colours.TOOL, AHEAD)
+    shades = np.where((np.arange(len(segments)) < reached)[:, None, None], colours.TOOL, AHEAD)
     return {
         "path": LinesFigure(
             float32(segments), np.broadcast_to(shades, segments.shape).astype(np.uint8), 1.8

@@ -236,7 +236,7 @@ class SequenceRenderer:
         if "tool" in view.layers:
             figures["tool"] = ToolFigure(*layer.tool(view.frame), view.opacity("tool"))
         if "path" in view.layers:
-            figures.update(path_lines(layer, view.frame))
+            figures.update(path_lines(layer.path, view.frame))
         if "landmarks" in view.layers:
             figures.update(self._annotations.landmark_figures())
         if "base" in view.layers:

@@ -102,6 +102,8 @@ class ViserScene:
         node.position = figure.place + figure.at if isinstance(figure, LabelFigure) else figure.at
         if isinstance(figure, CloudFigure):
             node.points = figure.points
+            if isinstance(figure.colour, np.ndarray):
+                node.colors = figure.colour
         elif isinstance(figure, SurfaceFigure):
             node.vertices, node.faces = figure.vertices, figure.faces.astype(np.uint32)
         elif isinstance(figure, LinesFigure):
@@ -116,7 +118,7 @@ class ViserScene:
                 name,
                 figure.points,
                 figure.colour,
-                point_size=POINT_SIZE,
+                point_size=figure.size or POINT_SIZE,
                 point_shape="circle",
                 precision="float32",
                 point_shading="flat",
@@ -171,7 +173,8 @@ class ViserScene:
 def _node_key(figure: Figure) -> tuple[Any, ...]:
     """Properties that cannot be changed in an existing node."""
     if isinstance(figure, CloudFigure):
-        return (CloudFigure, figure.points.shape, figure.colour)
+        colour = figure.colour if isinstance(figure.colour, tuple) else None
+        return (CloudFigure, figure.points.shape, colour, figure.size)
     if isinstance(figure, SurfaceFigure):
         return (SurfaceFigure, figure.colour, figure.opacity)
     if isinstance(figure, LinesFigure):

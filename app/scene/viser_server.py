@@ -15,10 +15,10 @@ from palpate.app.scene.viewpoint import FIELD_OF_VIEW
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["BY_HAND", "SceneListener", "ViewerServer"]
+__all__ = ["BY_HAND", "LOOK", "SceneListener", "ViewerServer"]
 
-BY_HAND = "-register"
-"""Suffix of the page's name in connections of manual registration."""
+BY_HAND, LOOK = "-register", "-look"
+"""Suffixes of the page's name in connections of manual registration, and of first looks."""
 S = TypeVar("S")
 
 
@@ -42,6 +42,7 @@ class ViewerServer:
 
     Args:
         show: is called for scenes of a page's replays.
+        looks: is called for scenes of first looks.
         pairs: is called for scenes of manual registration.
         clicked: is called with each click in the latter.
 
@@ -52,6 +53,7 @@ class ViewerServer:
     def __init__(
         self,
         show: SceneListener[PageScene],
+        looks: SceneListener[PageScene],
         pairs: SceneListener[PairScene],
         clicked: Callable[[str, Ray], None],
     ) -> None:
@@ -70,6 +72,9 @@ class ViewerServer:
                 self._left[client.client_id] = pairs.join(
                     page, ViserPairScene(client, lambda ray: clicked(page, ray))
                 )
+            elif page.endswith(LOOK):
+                page = page.removesuffix(LOOK)
+                self._left[client.client_id] = looks.join(page, ViserScene(client))
             else:
                 self._left[client.client_id] = show.join(page, ViserScene(client))
 

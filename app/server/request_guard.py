@@ -30,7 +30,7 @@ VIEWER_POLICY = (
 # Accessible without login: the page's own files, the login, and whether the server works.
 OPEN = ("/login", "/logout", "/health")
 OPEN_BELOW = "/static/"
-UPLOAD = "/api/imports"
+UPLOADS = ("/api/imports", "/api/uploads")
 WILD = frozenset({"0.0.0.0", "::"})
 TRICKS = (b"%2f", b"%5c", b"%2e", b"%00", b"//", b"\\")
 
@@ -125,7 +125,7 @@ class RequestGuard:
 
     def _most(self, scope: Scope) -> int:
         """Largest body of a request to this path [bytes]."""
-        return self._largest_upload if scope["path"] == UPLOAD else self._largest
+        return self._largest_upload if scope["path"] in UPLOADS else self._largest
 
     def _limited(self, receive: Receive, most: int) -> Receive:
         """The same body; raises HTTP 413 once it is longer than allowed, whatever its stated

@@ -23,7 +23,8 @@ PageId = Annotated[str, Parameter(pattern=r"^[A-Za-z0-9-]{8,64}$")]
 SENDABLE = (1000, 1001, 1002, 1003, 1008, 1011, 1012, 1013)
 # Hides the viewer's own panel, logo and notices, which cover the scene; the page has all controls.
 STYLE = """<style>
-[data-floating-window], [data-dock-leaf], .mantine-Notifications-root, .mantine-Notification-root {
+[data-floating-window], [data-dock-leaf], .mantine-Notifications-root, .mantine-Notification-root,
+.mantine-Paper-root[style*="fixed"] {
   display: none !important;
 }
 html, body, body div[style*="background-color"] { background: transparent !important; }

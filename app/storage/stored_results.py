@@ -12,6 +12,7 @@ from uuid import uuid4
 from palpate.app.http_errors import Missing
 from palpate.app.storage.disk_usage import size_of
 from palpate.app.storage.evaluation_store import EvaluationStore
+from palpate.app.storage.look_store import LookStore
 from palpate.app.storage.result_store import ResultStore
 from palpate.app.storage.run_store import RunStore
 from palpate.app.storage.sweep_store import SweepStore
@@ -25,7 +26,7 @@ class StoredResult:
     """A result on disk.
 
     Attributes:
-        kind: "run", "sweep", "training" or "evaluation".
+        kind: "run", "sweep", "training", "evaluation" or "look".
         name: of its folder.
         bytes: of all its files.
         created: time of the last change of its first file [s since 1970].
@@ -46,6 +47,7 @@ class StoredResults:
             SweepStore(runs),
             TrainingStore(runs),
             EvaluationStore(runs),
+            LookStore(runs),
         )
 
     def largest(self, most: int) -> list[StoredResult]:

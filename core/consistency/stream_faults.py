@@ -11,7 +11,7 @@ import numpy as np
 from palpate.consistency.contact_timeline import named
 from palpate.dataset import Dataset, Kinematics, Sequence
 
-__all__ = ["stream_doubts"]
+__all__ = ["frozen_stretch", "longest_jump", "stream_doubts"]
 
 FASTEST, FARTHEST = 1.0, 4e-3
 """Speed [m/s] and length [m] of a step of the robot from which it is a jump: teleoperated tools
@@ -32,8 +32,8 @@ _TAIL = 4096
 def stream_doubts(dataset: Dataset) -> tuple[str, ...]:
     """Sentences about impossible streams of all sequences."""
     names = dataset.sequences
-    jumps = {n: jump for n in names if (jump := _jump(dataset.sequence(n).kinematics))}
-    still = {n: stop for n in names if (stop := _frozen(dataset.sequence(n).kinematics))}
+    jumps = {n: jump for n in names if (jump := longest_jump(dataset.sequence(n).kinematics))}
+    still = {n: stop for n in names if (stop := frozen_stretch(dataset.sequence(n).kinematics))}
     same = {n: again for n in names if (again := _repeats(dataset, dataset.sequence(n)))}
     return (
         *_told_jumps(jumps, len(names)),
@@ -43,7 +43,7 @@ def stream_doubts(dataset: Dataset) -> tuple[str, ...]:
     )
 
 
-def _jump(clock: Kinematics) -> tuple[int, float, float, int] | None:
+def longest_jump(clock: Kinematics) -> tuple[int, float, float, int] | None:
     """Row before the longest jump out and back, its length [m] and speed [m/s], and the number of
     rows outside.
 
@@ -82,7 +82,7 @@ def _told_jumps(jumps: dict[str, tuple[int, float, float, int]], among: int) -> 
     )
 
 
-def _frozen(clock: Kinematics) -> tuple[float, float] | None:
+def frozen_stretch(clock: Kinematics) -> tuple[float, float] | None:
     """Start [s] and length [s] of the longest stretch in which a noisy stream stands still."""
     same = (np.diff(clock.position, axis=0) == 0).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(int), [0]])))

@@ -24,12 +24,18 @@ from palpate.importing.output.recorded_clouds import RecordedClouds
 from palpate.importing.output.stated_setup import check_setup, found_phantom, write_setup
 from palpate.importing.output.written_dataset import IMPORTED, DatasetWriter
 from palpate.importing.recording import Recording, opened_recording
-from palpate.importing.rules import ImportMapping, SequenceWindow
+from palpate.importing.rules import CutRules, ImportMapping, SequenceWindow
 from palpate.importing.timed_recording import TimedRecording, timed_recording
 
-__all__ = ["ImportedDataset", "import_recordings"]
+__all__ = [
+    "PROVISIONAL_SPLITS",
+    "ImportedDataset",
+    "chosen_splits",
+    "import_recordings",
+    "proposed_windows",
+]
 
-_PROVISIONAL = {"train": ["provisional"], "validation": [], "test": []}
+PROVISIONAL_SPLITS = {"train": ["provisional"], "validation": [], "test": []}
 """Splits until the sequences are known; a dataset.toml is read only with some."""
 
 
@@ -105,11 +111,13 @@ class _Run:
             timed_recording(one, self.mapping, self.notes, part(report, share * n, share * (n + 1)))
             for n, one in enumerate(recordings)
         ]
-        write_setup(self.writer, self.mapping, _PROVISIONAL, self.base)
+        write_setup(self.writer, self.mapping, PROVISIONAL_SPLITS, self.base)
         phantom = found_phantom(self.writer, timed, self.notes)
-        windows = self.mapping.sequences or self._windows(timed, phantom)
+        windows = self.mapping.sequences or proposed_windows(
+            timed, phantom, self.mapping.cutting, self.notes
+        )
         _check_windows(windows, [one.name for one in recordings])
-        splits = self.mapping.setup.get("splits") or self._splits(windows)
+        splits = chosen_splits(windows, self.mapping, self.notes)
         write_setup(self.writer, self.mapping, splits, self.base)
         report(0.45, "digests of the sources")
         sources = {one.name: file_digests(one.files(), self.earlier) for one in recordings}
@@ -132,34 +140,6 @@ class _Run:
         for name, old in reused.items():
             self.writer.reused(name, old)
         return self._finished(windows, sources, digests, tuple(reused))
-
-    def _windows(
-        self, timed: list[TimedRecording], phantom: LocatedPhantom | None
-    ) -> tuple[SequenceWindow, ...]:
-        rules = self.mapping.cutting
-        windows: tuple[SequenceWindow, ...] = ()
-        if rules.cut and phantom is not None:
-            windows = find_pushes(timed, phantom, rules)
-            if not windows:
-                self.notes.warn(
-                    "no push was found: the tool never reaches the phantom by the stated places; "
-                    "each recording is one sequence"
-                )
-        if not windows:
-            windows = tuple(whole_recording(one, rules) for one in timed)
-        for window in windows:
-            kind = window.kind or "not cut"
-            self.notes.decide(
-                f"{window.name}: {kind}, {window.recording} from {window.start:.2f} to "
-                f"{window.end:.2f} s"
-            )
-        return windows
-
-    def _splits(self, windows: tuple[SequenceWindow, ...]) -> dict[str, list[str]]:
-        splits = proposed_splits(windows)
-        said = "; ".join(f"{key} {', '.join(names) or 'none'}" for key, names in splits.items())
-        self.notes.decide(f"splits: {said}")
-        return splits
 
     def _write(
         self,
@@ -216,6 +196,54 @@ class _Run:
         self.writer.text(MAPPING, mapping_text(_from(mapping, self.base)))
         self.writer.text(IMPORTED, json.dumps(made, indent=1, ensure_ascii=False) + "\n")
         return ImportedDataset(folder=self.writer.folder, mapping=mapping, reused=reused)
+
+
+def proposed_windows(
+    timed: Sequence[TimedRecording],
+    phantom: LocatedPhantom | None,
+    rules: CutRules,
+    notes: ImportNotes,
+) -> tuple[SequenceWindow, ...]:
+    """Cut recordings into pushes, where the rules ask for it and the phantom is known, else make
+    each one sequence; `notes` takes each.
+    """
+    windows: tuple[SequenceWindow, ...] = ()
+    if rules.cut and phantom is not None:
+        windows = find_pushes(timed, phantom, rules)
+        if not windows:
+            notes.warn(
+                "no push was found: the tool never reaches the phantom by the stated places; "
+                "each recording is one sequence"
+            )
+    if not windows:
+        windows = tuple(whole_recording(one, rules) for one in timed)
+    for window in windows:
+        kind = window.kind or "not cut"
+        notes.decide(
+            f"{window.name}: {kind}, {window.recording} from {window.start:.2f} to "
+            f"{window.end:.2f} s"
+        )
+    return windows
+
+
+def chosen_splits(
+    windows: Sequence[SequenceWindow], mapping: ImportMapping, notes: ImportNotes
+) -> dict[str, list[str]]:
+    """Names of the sequences of each split: as the sequences state them, else as the setup does,
+    else proposed, which `notes` takes.
+    """
+    if any(one.split for one in windows):
+        return {
+            split: [one.name for one in windows if one.split == split]
+            for split in ("train", "validation", "test")
+        }
+    stated: dict[str, list[str]] = mapping.setup.get("splits") or {}
+    if stated:
+        return stated
+    splits = proposed_splits(windows)
+    said = "; ".join(f"{key} {', '.join(names) or 'none'}" for key, names in splits.items())
+    notes.decide(f"splits: {said}")
+    return splits
 
 
 def _from(mapping: ImportMapping, base: Path) -> ImportMapping:

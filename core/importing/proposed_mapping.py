@@ -21,7 +21,7 @@ from palpate.importing.rules import (
 )
 from palpate.importing.stream import Stream
 
-__all__ = ["proposed_mapping", "recording_name"]
+__all__ = ["no_pose", "proposed_mapping", "recording_name"]
 
 _POSES = (
     r"(?<!local/)\bmeasured_cp$",
@@ -42,6 +42,7 @@ def proposed_mapping(
     tables: dict[str, ColumnRules],
     topics: dict[str, str],
     notes: ImportNotes,
+    needs_pose: bool = True,
 ) -> ImportMapping:
     """Propose which streams are taken and what they mean.
 
@@ -52,13 +53,15 @@ def proposed_mapping(
         tables: meaning of columns, by file.
         topics: streams by role that are stated already.
         notes: take each choice.
+        needs_pose: whether a mapping without the pose of a tool is refused.
 
-    Raises DatasetError where no stream is the pose of a tool.
+    Raises DatasetError where no stream is the pose of a tool, and one is needed.
     """
     streams = [stream for one in recordings for stream in one.streams()]
-    pose = _stated(streams, topics.get("pose")) or _pose(streams)
-    notes.decide(f"pose of the tool: {pose.name}, frame '{_frame(pose)}'")
-    _warn_of_pose(pose, streams, notes)
+    pose = _stated(streams, topics.get("pose")) or _pose(streams, needs_pose)
+    if pose is not None:
+        notes.decide(f"pose of the tool: {pose.name}, frame '{_frame(pose)}'")
+        _warn_of_pose(pose, streams, notes)
     cloud = _stated(streams, topics.get("cloud")) or _cloud(streams)
     camera = _camera(streams, cloud) if cloud is not None and cloud.kind == "depth" else None
     if cloud is not None:
@@ -67,11 +70,12 @@ def proposed_mapping(
     wrench = _stated(streams, topics.get("wrench")) or _best(streams, "wrench", _WRENCHES)
     rules = WrenchRules() if wrench is None else _wrench_rules(wrench, pose, notes)
     cut = len(recordings) == 1
-    notes.decide(
-        "one recording: it is cut into pushes"
-        if cut
-        else f"{len(recordings)} recordings: each is one sequence"
-    )
+    if pose is not None:
+        notes.decide(
+            "one recording: it is cut into pushes"
+            if cut
+            else f"{len(recordings)} recordings: each is one sequence"
+        )
     return ImportMapping(
         name=name,
         recordings=tuple(
@@ -79,12 +83,12 @@ def proposed_mapping(
             for one in recordings
         ),
         streams=StreamChoice(
-            pose=pose.name,
+            pose=pose.name if pose else "",
             cloud=cloud.name if cloud else "",
             camera=camera.name if camera else "",
             wrench=wrench.name if wrench else "",
         ),
-        pose=PoseRules(frame=_frame(pose)),
+        pose=PoseRules(frame=_frame(pose) if pose else ""),
         wrench=rules,
         tables=tables,
         cutting=CutRules(cut=cut),
@@ -105,18 +109,23 @@ def _stated(streams: Sequence[Stream], name: str | None) -> Stream | None:
     return found
 
 
-def _pose(streams: Sequence[Stream]) -> Stream:
+def _pose(streams: Sequence[Stream], needed: bool) -> Stream | None:
     found = _best(streams, "pose", _POSES)
-    if found is not None:
-        return found
+    if found is None and needed:
+        raise no_pose(streams)
+    return found
+
+
+def no_pose(streams: Sequence[Stream]) -> DatasetError:
+    """The error for recordings without the pose of a tool."""
     if any(one.kind == "joints" for one in streams):
         names = ", ".join(dict.fromkeys(one.name for one in streams if one.kind == "joints"))
         text = (
             f"only joint states are there ({names}), which need the robot's kinematics; expected "
             "the pose of the tool: record measured_cp beside them"
         )
-        raise DatasetError(text, key="streams.pose")
-    raise DatasetError(
+        return DatasetError(text, key="streams.pose")
+    return DatasetError(
         f"no stream is known as the pose of a tool; there are {_listing(streams)}: name it by "
         "--pose, or in import.toml",
         key="streams.pose",
@@ -156,7 +165,7 @@ def _camera(streams: Sequence[Stream], image: Stream) -> Stream | None:
     return max(cameras, key=shared) if cameras else None
 
 
-def _wrench_rules(wrench: Stream, pose: Stream, notes: ImportNotes) -> WrenchRules:
+def _wrench_rules(wrench: Stream, pose: Stream | None, notes: ImportNotes) -> WrenchRules:
     notes.decide(f"forces: {wrench.name}, frame '{_frame(wrench)}'")
     estimated = "measured_cf" in wrench.name
     if estimated:
@@ -168,16 +177,17 @@ def _wrench_rules(wrench: Stream, pose: Stream, notes: ImportNotes) -> WrenchRul
     if wrench.name.endswith("body/measured_cf"):
         notes.decide(f"{wrench.name} turns with the tool")
         return WrenchRules(frame="tool", zero="fitted", estimated=True)
+    frame = _frame(pose) if pose else ""
     own_table = wrench.name.endswith("forces.csv#wrench")
     if (
         own_table
         or wrench.name.endswith("spatial/measured_cf")
-        or (_frame(wrench) and _frame(wrench) == _frame(pose))
+        or (_frame(wrench) and _frame(wrench) == frame)
     ):
         notes.decide(f"{wrench.name} is in the robot frame")
         return WrenchRules(frame="robot", estimated=estimated)
     notes.warn(
-        f"{wrench.name}: its frame '{_frame(wrench)}' is not that of the poses, '{_frame(pose)}'; "
+        f"{wrench.name}: its frame '{_frame(wrench)}' is not that of the poses, '{frame}'; "
         'state [wrench] frame as "robot" or "tool"'
     )
     return WrenchRules(estimated=estimated)

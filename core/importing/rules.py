@@ -169,6 +169,8 @@ class SequenceWindow(_Rules):
         start: first time that is kept [s], on the clock of the poses.
         end: last time that is kept [s].
         kind: top, side, drag or trace; empty where it is not known.
+        split: train, validation or test; "none" for a sequence in none of them. Empty to have it
+            proposed; once any sequence states one, those without are in none.
     """
 
     name: Name
@@ -176,6 +178,7 @@ class SequenceWindow(_Rules):
     start: float
     end: float
     kind: Literal["", "top", "side", "drag", "trace"] = ""
+    split: Literal["", "train", "validation", "test", "none"] = ""
 
 
 class RestRules(_Rules):

@@ -23,7 +23,7 @@ from palpate.importing.sources.table_source import TableSource
 from palpate.importing.stream import Source
 from palpate.importing.tables.table_evidence import TableEvidence
 
-__all__ = ["Survey", "survey"]
+__all__ = ["Survey", "read_setup", "survey"]
 
 _SETUP = "dataset.toml"
 _TABLES = ("kinematics.csv", "clouds.csv", "forces.csv")
@@ -64,8 +64,10 @@ class Survey:
         for one in self.recordings:
             one.close()
 
-    def proposal(self, name: str, notes: ImportNotes) -> ImportMapping:
-        """Propose a mapping; DatasetError where no stream is the pose of a tool."""
+    def proposal(self, name: str, notes: ImportNotes, needs_pose: bool = True) -> ImportMapping:
+        """Propose a mapping; DatasetError where no stream is the pose of a tool, and one is
+        needed.
+        """
         tables: dict[str, ColumnRules] = {}
         self._agree(notes)
         for recording in self.recordings:
@@ -75,7 +77,7 @@ class Survey:
             for warning in recording.warnings():
                 notes.warn(warning)
         mapping = proposed_mapping(
-            self.recordings, self.name or name, self.setup, tables, self.topics, notes
+            self.recordings, self.name or name, self.setup, tables, self.topics, notes, needs_pose
         )
         for preset, path in self.laid_out:
             notes.decide(f"{path.name}: read as {preset.name}, {preset.summary}")
@@ -118,7 +120,7 @@ def survey(paths: Sequence[Path], setup: Path | None, preset: str = "") -> Surve
         for path in paths:
             _take(found, loose, path.resolve())
         if setup is not None:
-            _read_setup(found, setup.resolve())
+            read_setup(found, setup.resolve())
         found.recordings.extend(_grouped(loose))
         if not found.recordings:
             raise DatasetError("no recording is among the files; expected at least one")
@@ -158,7 +160,7 @@ def _is_statement(found: Survey, path: Path) -> bool:
     """Whether a file states something beside recordings, by its name; it is taken up then."""
     match path.name:
         case "dataset.toml":
-            _read_setup(found, path)
+            read_setup(found, path)
         case "touches.csv":
             found.touches = str(path)
         case "traces.csv":
@@ -172,7 +174,7 @@ def _is_statement(found: Survey, path: Path) -> bool:
 
 def _take_dataset(found: Survey, folder: Path) -> None:
     """Take up a dataset whose sequences are folders or bags."""
-    _read_setup(found, folder / _SETUP)
+    read_setup(found, folder / _SETUP)
     for name in ("touches.csv", "traces.csv", "rest.ply"):
         if (folder / name).is_file():
             _is_statement(found, folder / name)
@@ -188,7 +190,8 @@ def _take_dataset(found: Survey, folder: Path) -> None:
             found.recordings.append(Recording(recording_name(place), (open_source(place),)))
 
 
-def _read_setup(found: Survey, path: Path) -> None:
+def read_setup(found: Survey, path: Path) -> None:
+    """Take up a dataset.toml: its tables, its folder, the dataset's name and stated streams."""
     values = read_toml(path.parent, path.name, _LIMIT)
     found.setup = {key: values[key] for key in SETUP_TABLES if key in values}
     found.setup_folder = str(path.parent)

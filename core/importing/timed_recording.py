@@ -18,7 +18,7 @@ from palpate.importing.import_notes import ImportNotes
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ImportMapping
 
-__all__ = ["TimedRecording", "timed_recording"]
+__all__ = ["TimedRecording", "on_one_clock", "timed_recording"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,15 +60,28 @@ def timed_recording(
 
     Raises DatasetError where there is no pose, or its frame changes.
     """
-    streams = mapping.streams
-    roles = {
-        "pose": recording.named(streams.pose, "pose"),
-        "cloud": recording.named(streams.cloud, "cloud"),
-        "wrench": recording.named(streams.wrench, "wrench"),
+    names = {
+        name: role != "cloud"
+        for role, name in _roles(recording, mapping).items()
+        if recording.stream(name) is not None
     }
-    there = {one.name for one in recording.streams()}
-    names = {name: role != "cloud" for role, name in roles.items() if name in there}
-    found = recording.tracks(names, report)
+    return on_one_clock(recording, recording.tracks(names, report), mapping, notes)
+
+
+def on_one_clock(
+    recording: Recording, found: dict[str, Track], mapping: ImportMapping, notes: ImportNotes
+) -> TimedRecording:
+    """Bring the chosen streams, as read, to one time line.
+
+    Args:
+        recording: that holds them.
+        found: its tracks by name of the stream, with the values of poses and forces.
+        mapping: which of them are taken.
+        notes: take what was done.
+
+    Raises DatasetError where there is no pose, or its frame changes.
+    """
+    streams, roles = mapping.streams, _roles(recording, mapping)
     if roles["pose"] not in found:
         known = ", ".join(one.name for one in recording.streams())
         raise DatasetError(
@@ -93,6 +106,16 @@ def timed_recording(
             f"{1e3 * timed.uncertainty:.1f} ms"
         )
     return timed
+
+
+def _roles(recording: Recording, mapping: ImportMapping) -> dict[str, str]:
+    """Names of the chosen streams in a recording, by role."""
+    streams = mapping.streams
+    return {
+        "pose": recording.named(streams.pose, "pose"),
+        "cloud": recording.named(streams.cloud, "cloud"),
+        "wrench": recording.named(streams.wrench, "wrench"),
+    }
 
 
 def _timed(

@@ -29,6 +29,7 @@ __all__ = ["REASONS", "CleanCloud", "Cleaner", "cleaner_for"]
 
 IndexArray = np.ndarray[Any, np.dtype[np.int64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
+ReasonArray = np.ndarray[Any, np.dtype[np.int8]]
 
 REASONS = ("kept", "table", "tool", "shaft", "background", "stray", "hole", "holder")
 """Labels of points: the phantom's ("kept"), and why others are removed."""
@@ -58,12 +59,14 @@ class CleanCloud:
         indices: (n,) rows of the raw cloud.
         table_points: (m, 3) [m] of the table around the phantom, phantom frame.
         counts: number of points for each of REASONS.
+        reasons: (k,) of every point of the raw cloud, as an index into REASONS.
     """
 
     points: FloatArray
     indices: IndexArray
     table_points: FloatArray
     counts: dict[str, int]
+    reasons: ReasonArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,6 +137,7 @@ class Cleaner:
             indices,
             points[on_table & (apart > thickness) & (apart < TABLE_REACH)],
             {name: int(count) for name, count in zip(REASONS, counts, strict=True)},
+            reason,
         )
 
     def _on_holder(self, points: FloatArray) -> Mask:

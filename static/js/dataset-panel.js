@@ -3,6 +3,7 @@
 import { get, post, toast, toError } from "./api.js";
 import { byId, element, fill } from "./dom.js";
 import { capitalise, formatMm } from "./format.js";
+import { lookAtDataset } from "./import-panel.js";
 import { openPanel } from "./panels.js";
 import { cameraSelect, openRegistration } from "./register.js";
 
@@ -12,8 +13,9 @@ import { cameraSelect, openRegistration } from "./register.js";
  * Check a dataset and show it.
  * @param {string} name
  * @param {(dataset: string, registration: string | null) => Promise<void>} diagnose
+ * @param {string[]} [said] warnings of the import that made it just before
  */
-export async function showDataset(name, diagnose) {
+export async function showDataset(name, diagnose, said = []) {
   const panel = byId("panel");
   openPanel("report");
   fill(
@@ -74,11 +76,22 @@ export async function showDataset(name, diagnose) {
             post(`/datasets/${encodeURIComponent(name)}/registrations/automatic`),
           )
         : null,
+      element(
+        "button",
+        {
+          class: "button",
+          type: "button",
+          title: "Clouds, tool and forces over time, before any job",
+          onclick: () => lookAtDataset(name),
+        },
+        "Look",
+      ),
       jobButton("Replay", "All sequences as the setup is stated, seen like a diagnosis", () =>
         post("/replays", { dataset: name, registration: camera.value || null }),
       ),
     ),
     camera.hidden ? null : element("label", { class: "register-dataset" }, "Camera", camera),
+    noteSection("Said by the import", said),
     noteSection("Doubtful", summary.warnings),
     noteSection("Missing for some causes", summary.lacks),
     element(

@@ -2,6 +2,7 @@
 // keys.
 import { byId, element, fill, icon } from "./dom.js";
 import { bindShortcuts } from "./shortcuts.js";
+import { CUT_SHORTCUTS } from "./look-timeline-keys.js";
 import { REGISTER_SHORTCUTS as REGISTER } from "./register-shortcuts.js";
 
 /**
@@ -18,7 +19,7 @@ const PAGE = [
   ["0 1 2 3", "look from the side of the camera, the top, the front, the side"],
   ["B", "models side by side"],
   ["X", "cut the phantom open"],
-  ["Ctrl Z", "undo, in What if and in Register"],
+  ["Ctrl Z", "undo, in What if, Register and Import"],
   ["Tab, Enter", "reach and press every control"],
 ];
 
@@ -44,9 +45,10 @@ const STEPS = [
         " made a phantom with a hidden fault, and opened this page on it: it stands under " +
           "Datasets. Of your own, press ",
         element("b", {}, "Import …"),
-        " there and choose an archive of your folder, or name a folder on the server’s disk. " +
-          "The import shows among the jobs; what is wrong with the data is listed by file and " +
-          "row.",
+        " there and choose what the bench recorded: bags, tables, folders of clouds. Look at " +
+          "them: streams and their roles, clouds, tool and forces over time, where each push " +
+          "begins and ends. Correct what you know better, name the dataset and import it. A " +
+          "dataset that is finished comes as an archive, or as a folder on the server’s disk.",
       ),
       element(
         "p",
@@ -186,6 +188,7 @@ export function startHelp() {
       { class: "key-lists" },
       element("section", {}, element("h2", {}, "Keys everywhere"), list(PAGE)),
       element("section", {}, element("h2", {}, "Keys in Register"), list(REGISTER)),
+      element("section", {}, element("h2", {}, "Keys in Import"), list(CUT_SHORTCUTS)),
     ),
   );
   dialog.addEventListener("click", (event) => {

@@ -1,9 +1,11 @@
 // The dialog that imports a dataset: an archive, chosen or dropped on the page, or a folder on
 // the server. The import is a job.
-import { ApiError, errorCard, post } from "./api.js";
+import { errorCard, post } from "./api.js";
 import { element, fill } from "./dom.js";
+import { upload } from "./upload.js";
 
 const NAME = "[A-Za-z0-9][A-Za-z0-9._\\-]*";
+const ARCHIVE = /\.(zip|tar|tgz|gz|bz2|xz)$/i;
 /** @type {HTMLDialogElement | null} */
 let box = null;
 
@@ -19,17 +21,22 @@ export function openImportDialog(file = null) {
   if (!box.open) box.showModal();
 }
 
-/** Import an archive that is dropped anywhere on the page. */
-export function importDroppedFiles() {
+/**
+ * Take what is dropped anywhere on the page: an archive alone is imported as a dataset, unless
+ * `wanted` says otherwise; all else are recordings.
+ * @param {(files: File[]) => void} takeRecordings
+ * @param {() => boolean} wanted whether archives are recordings too
+ */
+export function importDroppedFiles(takeRecordings, wanted) {
   window.addEventListener("dragover", (event) => {
     if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
   });
   window.addEventListener("drop", (event) => {
-    const [file] = event.dataTransfer?.files ?? [];
-    if (file) {
-      event.preventDefault();
-      openImportDialog(file);
-    }
+    const files = [...(event.dataTransfer?.files ?? [])];
+    if (!files.length) return;
+    event.preventDefault();
+    if (files.length === 1 && ARCHIVE.test(files[0].name) && !wanted()) openImportDialog(files[0]);
+    else takeRecordings(files);
   });
 }
 
@@ -96,7 +103,7 @@ function draw(dialog, file) {
         progress.hidden = !archive;
         try {
           if (archive)
-            await upload(archive, name.value, (share) => {
+            await upload(`/imports?name=${encodeURIComponent(name.value)}`, archive, (share) => {
               bar.style.width = `${100 * share}%`;
             });
           else await post("/imports/folder", { folder: folder.value, name: name.value });
@@ -144,44 +151,9 @@ function draw(dialog, file) {
  * @param {string} file
  * @returns {string}
  */
-const datasetName = (file) =>
+export const datasetName = (file) =>
   file
-    .replace(/(\.tar)?\.(zip|tar|gz|tgz|bz2|xz)$/i, "")
+    .replace(/(\.tar)?\.(zip|tar|gz|tgz|bz2|xz|bag|mcap|db3|csv|tsv|mat)$/i, "")
     .replace(/[^A-Za-z0-9._-]+/g, "-")
     .replace(/^[^A-Za-z0-9]+/, "")
     .slice(0, 64);
-
-/**
- * Send a file with XMLHttpRequest, because fetch does not report progress.
- * @param {File} file
- * @param {string} name
- * @param {(share: number) => void} onProgress
- * @returns {Promise<unknown>}
- */
-function upload(file, name, onProgress) {
-  return new Promise((done, refused) => {
-    const request = new XMLHttpRequest();
-    request.open("POST", `/api/imports?name=${encodeURIComponent(name)}`);
-    request.setRequestHeader("content-type", "application/octet-stream");
-    request.upload.onprogress = ({ loaded, total }) => onProgress(total ? loaded / total : 0);
-    request.onload = () => {
-      let body = { kind: "Error", message: `The server answered ${request.status}.`, where: {} };
-      try {
-        body = JSON.parse(request.responseText);
-      } catch {
-        // The message above is shown.
-      }
-      if (request.status < 300) done(body);
-      else refused(new ApiError(body));
-    };
-    request.onerror = () =>
-      refused(
-        new ApiError({
-          kind: "No answer",
-          message: "The connection broke while sending; try again.",
-          where: {},
-        }),
-      );
-    request.send(file);
-  });
-}

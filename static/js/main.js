@@ -3,6 +3,7 @@ import { get, toast } from "./api.js";
 import * as correction from "./correction-panel.js";
 import { byId, fill, icon } from "./dom.js";
 import { startHelp } from "./help.js";
+import { openLook, startImports } from "./import-panel.js";
 import * as live from "./live-panel.js";
 import { startLogOut } from "./log-out.js";
 import { openRun, openSequence } from "./open-run.js";
@@ -42,6 +43,7 @@ async function start() {
   const palette = await get("/palette");
   set({ palette });
   timeline.start();
+  startImports(sidebar.openDataset);
   startSweeps();
   correction.start(() => openSequence().catch(toast));
   startRegister(sidebar.openDataset);
@@ -58,13 +60,16 @@ async function start() {
     openPanel("report");
     return openRun(id);
   });
-  const id = new URLSearchParams(location.search).get("run") ?? state().run;
+  const asked = new URLSearchParams(location.search);
+  const look = asked.get("look");
+  const id = asked.get("run") ?? state().run;
   const run = sidebar.runToOpen(id);
   if (run) await openRun(run);
   else {
     set({ run: null, sequence: null });
     showWelcome(datasets > 0);
   }
+  if (look) openLook(look);
 }
 
 start().catch(toast);

@@ -1,11 +1,12 @@
 // The left sidebar: jobs, runs, the sequences of the open run, datasets.
 import { get, post, toast } from "./api.js";
-import { openImportDialog, importDroppedFiles } from "./import-dialog.js";
+import { importDroppedFiles } from "./import-dialog.js";
+import { lookAtDataset, takeFiles } from "./import-panel.js";
 import { showDataset } from "./dataset-panel.js";
 import { byId, element, fill } from "./dom.js";
 import { formatMm, formatDateTime, readableName } from "./format.js";
 import { onJobsDone, onResultDeleted, addResultOpener, startJobs } from "./jobs.js";
-import { openedPanel } from "./panels.js";
+import { openedPanel, openPanel } from "./panels.js";
 import { openRegistration } from "./register.js";
 import { subscribe, set, state } from "./store.js";
 
@@ -51,8 +52,8 @@ export async function start(open) {
   addResultOpener("registration", "See the registration", (_, __, { dataset }) =>
     openRegistration(dataset),
   );
-  byId("import").addEventListener("click", () => openImportDialog());
-  importDroppedFiles();
+  byId("import").addEventListener("click", () => openPanel("import"));
+  importDroppedFiles(takeFiles, () => openedPanel() === "import");
   startJobs();
   const [datasets] = await Promise.all([refreshDatasets(), refreshRuns()]);
   return datasets.length;
@@ -67,9 +68,24 @@ async function refreshDatasets() {
     datasets.length
       ? datasets.map((name) =>
           element(
-            "button",
-            { class: "row", type: "button", onclick: () => showDataset(name, diagnose) },
-            element("span", { class: "name" }, name),
+            "div",
+            { class: "row-pair" },
+            element(
+              "button",
+              { class: "row", type: "button", onclick: () => showDataset(name, diagnose) },
+              element("span", { class: "name" }, name),
+            ),
+            element(
+              "button",
+              {
+                class: "link",
+                type: "button",
+                title: `Look at the recordings of ${name}`,
+                "aria-label": `Look at ${name}`,
+                onclick: () => lookAtDataset(name),
+              },
+              "Look",
+            ),
           ),
         )
       : element(
@@ -84,8 +100,9 @@ async function refreshDatasets() {
 /**
  * Show a dataset in the right panel.
  * @param {string} name
+ * @param {string[]} [said] warnings of the import that made it just before
  */
-export const openDataset = (name) => showDataset(name, diagnose);
+export const openDataset = (name, said = []) => showDataset(name, diagnose, said);
 
 /** @type {RunEntry[]} */
 let runs = [];

@@ -13,7 +13,7 @@ from palpate.foundation.arrays import FloatArray
 from palpate.importing.timed_recording import TimedRecording
 from palpate.registration.robot.robot_fit import rigid_fits
 
-__all__ = ["FoundTouches", "find_dwells", "find_touches"]
+__all__ = ["Dwells", "FoundTouches", "find_dwells", "find_touches"]
 
 STILL = 0.001
 """Speed below which the tool stands still [m/s]."""
@@ -26,6 +26,23 @@ CLEAR = 2.0
 """Ratio of the second best RMS to the best from which the choice is unambiguous [1]."""
 _MOST = 200_000
 """Choices of dwells that are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dwells:
+    """Stretches of a recording in which the tool stands still.
+
+    Attributes:
+        starts: (m,) [s].
+        ends: (m,) [s].
+        middles: (m,) mean times [s].
+        places: (m, 3) tool centres [m], robot frame.
+    """
+
+    starts: FloatArray
+    ends: FloatArray
+    middles: FloatArray
+    places: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +69,11 @@ class FoundTouches:
         return self.rms < FARTHEST and self.second > CLEAR * max(self.rms, 1e-4)
 
 
-def find_dwells(recording: TimedRecording) -> tuple[FloatArray, FloatArray]:
-    """Find where the tool stands still.
-
-    Returns:
-        middles (m,) of the dwells [s], and tool centres (m, 3) there [m], robot frame.
-    """
+def find_dwells(recording: TimedRecording) -> Dwells:
+    """Find where the tool stands still."""
     time, path = averaged_path(recording.time, recording.positions)
+    if len(time) < 2:
+        return Dwells(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
     speed = np.linalg.norm(np.gradient(path, axis=0), axis=1) / np.gradient(time)
     still = np.concatenate([[False], speed < STILL, [False]])
     starts, stops = (
@@ -70,9 +85,12 @@ def find_dwells(recording: TimedRecording) -> tuple[FloatArray, FloatArray]:
         for start, stop in zip(starts, stops, strict=True)
         if time[stop - 1] - time[start] >= LEAST_DWELL
     ]
-    middles = np.array([time[part].mean() for part in dwells])
-    places = np.array([np.median(path[part], axis=0) for part in dwells]).reshape(-1, 3)
-    return middles, places
+    return Dwells(
+        np.array([time[part.start] for part in dwells]),
+        np.array([time[part.stop - 1] for part in dwells]),
+        np.array([time[part].mean() for part in dwells]),
+        np.array([np.median(path[part], axis=0) for part in dwells]).reshape(-1, 3),
+    )
 
 
 def find_touches(
@@ -93,7 +111,8 @@ def find_touches(
         return None
     best: FoundTouches | None = None
     for recording in recordings:
-        times, places = find_dwells(recording)
+        dwells = find_dwells(recording)
+        times, places = dwells.middles, dwells.places
         if len(places) < len(names):
             continue
         choices = np.array(list(islice(combinations(range(len(places)), len(names)), _MOST)))

@@ -36,12 +36,14 @@ class LocatedPhantom:
         radius: of the ball [m].
         phantom_from_robot: from touches, traces or a stated pose.
         touched: (n, 3) tool centres at the touches of landmarks [m], robot frame.
+        landmarks: (n) their names.
     """
 
     geometry: Box | Shape
     radius: float
     phantom_from_robot: Transform
     touched: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    landmarks: tuple[str, ...] = ()
 
     def contacts(self, recording: TimedRecording) -> tuple[tuple[Contact, ...], FloatArray]:
         """Contacts of a recording, and the gaps (n,) [m] at `averaged_path`'s times."""

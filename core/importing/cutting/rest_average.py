@@ -18,6 +18,8 @@ CLEAR = 0.01
 """Gap from which the tool is clear of the phantom and of its shadow on it [m]."""
 FIRST = 1.0
 """Time at the start of a recording that counts as untouched where no phantom is known [s]."""
+_ROWS = 32
+"""Rows of an image that are averaged at a time, which bounds the memory."""
 _LEAST_SHARE = 0.5
 """Share of frames in which a pixel must be seen to count."""
 
@@ -47,6 +49,15 @@ def untouched_clouds(
     return chosen, f"the tool {1e3 * gaps[chosen].min():.0f} mm or more away, before any contact"
 
 
+def _medians(frames: Sequence[FloatArray]) -> FloatArray:
+    """Medians (m, 3) [m] of the pixels of frames (rows, columns, 3) that are often seen."""
+    stack = np.stack(frames)
+    seen = np.isfinite(stack).all(axis=-1)
+    often = seen.mean(axis=0) >= _LEAST_SHARE
+    # The median keeps a flying pixel out of the mean of its place.
+    return np.asarray(np.nanmedian(stack[:, often], axis=0))
+
+
 def averaged_cloud(frames: Sequence[FloatArray]) -> tuple[FloatArray, str]:
     """Average frames pixel by pixel where they are organised, else take the middle one.
 
@@ -58,11 +69,12 @@ def averaged_cloud(frames: Sequence[FloatArray]) -> tuple[FloatArray, str]:
     """
     shapes = {frame.shape for frame in frames}
     if len(frames) > 1 and len(shapes) == 1 and frames[0].ndim == 3:
-        stack = np.stack(frames)
-        seen = np.isfinite(stack).all(axis=-1)
-        often = seen.mean(axis=0) >= _LEAST_SHARE
-        # The median keeps a flying pixel out of the mean of its place.
-        points = np.nanmedian(stack[:, often], axis=0)
+        points = np.concatenate(
+            [
+                _medians([frame[start : start + _ROWS] for frame in frames])
+                for start in range(0, len(frames[0]), _ROWS)
+            ]
+        )
         return points, f"median of {len(frames)} frames, pixel by pixel"
     middle = frames[len(frames) // 2].reshape(-1, 3)
     why = "its clouds are not organised" if len(frames) > 1 else "there is one"

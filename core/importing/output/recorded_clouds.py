@@ -14,6 +14,7 @@ from palpate.importing.cutting.pushes import LocatedPhantom
 from palpate.importing.cutting.rest_average import averaged_cloud, untouched_clouds
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.messages.pinhole_camera import PinholeCamera
+from palpate.importing.messages.point_cloud import unmeasured
 from palpate.importing.output.written_dataset import DatasetWriter
 from palpate.importing.recording import Recording
 from palpate.importing.rules import ImportMapping, SequenceWindow
@@ -33,6 +34,8 @@ class RecordedClouds:
         mapping: what is taken.
         writer: of the dataset.
         notes: take what was done.
+        only: numbers of the clouds in `timed` that are written; None for all.
+        most: points of a cloud that are written, evenly chosen; None for all.
     """
 
     recording: Recording
@@ -40,6 +43,8 @@ class RecordedClouds:
     mapping: ImportMapping
     writer: DatasetWriter
     notes: ImportNotes
+    only: frozenset[int] | None = None
+    most: int | None = None
     _rest: list[FloatArray] = field(default_factory=list)
 
     def write(
@@ -56,6 +61,8 @@ class RecordedClouds:
         for window in windows:
             inside = np.flatnonzero((times >= window.start * 1e9) & (times <= window.end * 1e9))
             for at in inside.tolist():
+                if self.only is not None and at not in self.only:
+                    continue
                 row = int(self.timed.cloud_rows[at])
                 wanted.setdefault(row, []).append((window.name, int(times[at])))
         if wanted or resting:
@@ -103,10 +110,18 @@ class RecordedClouds:
                 camera = camera or self._camera()
                 points = camera.points(points)
             for name, time in wanted.get(row, ()):
-                self.writer.cloud(name, time, points)
+                self.writer.cloud(name, time, self._thinned(points))
             if row in resting:
                 self._rest.append(points.astype(np.float32))
             report(row / max(1, last), f"{self.recording.name}: cloud {row + 1} of {last + 1}")
+
+    def _thinned(self, points: FloatArray) -> FloatArray:
+        """Points (..., 3) [m], or an even choice (n, 3) among them."""
+        if self.most is None or points.size <= 3 * self.most:
+            return points
+        seen = points.reshape(-1, 3)
+        seen = seen[~unmeasured(seen)]
+        return seen[:: 1 + (len(seen) - 1) // self.most] if len(seen) else seen
 
     def _camera(self) -> PinholeCamera:
         """The camera by the first of its camera_info."""

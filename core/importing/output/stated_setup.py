@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.dataset.contact_points import Touches, read_touches, read_traces
+from palpate.dataset.files import read_toml
 from palpate.dataset.folder import Dataset, stated
 from palpate.foundation.arrays import FloatArray
 from palpate.foundation.errors import DatasetError, RegistrationError
@@ -20,14 +22,24 @@ from palpate.importing.rules import ImportMapping
 from palpate.importing.timed_recording import TimedRecording
 from palpate.registration.robot.robot_statements import robot_fits, touched_centres
 
-__all__ = ["ESTIMATED_SIGMA", "SETUP_TABLES", "check_setup", "found_phantom", "write_setup"]
+__all__ = [
+    "ESTIMATED_SIGMA",
+    "SETUP_TABLES",
+    "SURFACES",
+    "check_setup",
+    "copied_setup",
+    "found_phantom",
+    "write_setup",
+]
 
 SETUP_TABLES = ("phantom", "tool", "landmarks", "robot", "camera", "force", "motion", "splits")
 """Tables of dataset.toml that an import takes over."""
 ESTIMATED_SIGMA = 2.0
 """Standard deviation of forces that are estimated from motor currents [N]; public work on the dVRK
 finds about 2 N RMS."""
-_SURFACES = ("surface", "fixed_surface", "holder")
+SURFACES = ("surface", "fixed_surface", "holder")
+"""Keys of [phantom] that name files."""
+_LIMIT = 2**20
 
 
 def check_setup(mapping: ImportMapping) -> None:
@@ -49,6 +61,34 @@ def check_setup(mapping: ImportMapping) -> None:
             )
 
 
+def copied_setup(dataset: Path, folder: Path) -> Path:
+    """Copy what a dataset states, with its surfaces and without its splits; returns the new
+    dataset.toml.
+
+    Raises DatasetError where its dataset.toml cannot be read, or names a file that it lacks.
+    """
+    values = read_toml(dataset, "dataset.toml", _LIMIT)
+    kept = {key: values[key] for key in SETUP_TABLES if key in values and key != "splits"}
+    for key in SURFACES:
+        named = kept.get("phantom", {}).get(key, [])
+        for file in [named] if isinstance(named, str) else named:
+            source, place = (dataset / file).resolve(), folder / file
+            if not source.is_relative_to(dataset.resolve()) or not source.is_file():
+                raise DatasetError(
+                    f"dataset.toml: phantom.{key} = {file!r} is no file of the dataset "
+                    f"{dataset.name}: take the setup of another one",
+                    file="dataset.toml",
+                    key=f"phantom.{key}",
+                )
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.unlink(missing_ok=True)
+            shutil.copyfile(source, place)
+    written = folder / "dataset.toml"
+    written.unlink(missing_ok=True)
+    written.write_text(toml_text(kept), encoding="utf-8")
+    return written
+
+
 def write_setup(
     writer: DatasetWriter, mapping: ImportMapping, splits: dict[str, list[str]], base: Path
 ) -> None:
@@ -60,7 +100,7 @@ def write_setup(
         values["motion"] = {"stamps": "synthetic", **mapping.setup.get("motion", {})}
     writer.text("dataset.toml", toml_text(values))
     home = base / mapping.setup_folder
-    for key in _SURFACES:
+    for key in SURFACES:
         named = mapping.setup["phantom"].get(key, [])
         for file in [named] if isinstance(named, str) else named:
             writer.copied(file, home / file)
@@ -102,7 +142,7 @@ def found_phantom(
         return None
     notes.decide(f"robot and phantom: {fits[0].summary}" if fits[0].summary else "robot: stated")
     pose = fits[0].phantom_from_robot
-    return LocatedPhantom(geometry, config.tool_radius, pose, touches.positions)
+    return LocatedPhantom(geometry, config.tool_radius, pose, touches.positions, touches.names)
 
 
 def _find_touches(

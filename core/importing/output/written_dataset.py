@@ -129,6 +129,11 @@ class DatasetWriter:
             lines = ["t,file", *(f"{_seconds(time)},{file}" for time, file in rows)]
             self.text(f"sequences/{name}/clouds.csv", "\n".join(lines) + "\n")
 
+    def listed(self, name: str) -> tuple[tuple[int, str], ...]:
+        """Times [ns] and files, relative to the dataset, of the clouds that were written."""
+        rows = self._clouds.get(name, [])
+        return tuple((time, f"sequences/{name}/{file}") for time, file in rows)
+
     def rest(self, points: FloatArray) -> None:
         """Write the rest cloud (..., 3) [m]."""
         kept, _ = _kept(points)

@@ -77,6 +77,7 @@ class Walk:
     def import_dataset(self, archive: str) -> None:
         page = self.page.page
         page.click("#import")
+        page.click("text=Bring its archive or folder")
         page.set_input_files("input[name=file]", archive)
         assert page.input_value("input[name=name]") == "bench-07"
         self.picture("import")

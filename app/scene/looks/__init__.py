@@ -1,0 +1,1 @@
+"""Scenes of first looks: clouds by the reason of each point, tool, path and stated surface."""
