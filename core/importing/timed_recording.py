@@ -60,10 +60,9 @@ def timed_recording(
 
     Raises DatasetError where there is no pose, or its frame changes.
     """
+    there = {one.name for one in recording.streams()}
     names = {
-        name: role != "cloud"
-        for role, name in _roles(recording, mapping).items()
-        if recording.stream(name) is not None
+        name: role != "cloud" for role, name in _roles(recording, mapping).items() if name in there
     }
     return on_one_clock(recording, recording.tracks(names, report), mapping, notes)
 

@@ -43,4 +43,4 @@ def informative_frames(
         gain[chosen] = -1.0
         chosen.append(int(gain.argmax()))
         apart = np.minimum(apart, np.linalg.norm(places - places[chosen[-1]], axis=1))
-    return near[np.sort(chosen)]
+    return np.asarray(near[np.sort(chosen)])
