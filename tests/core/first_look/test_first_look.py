@@ -52,7 +52,7 @@ def test_a_look_has_streams_with_roles_pushes_touches_and_the_rest(
         *("poke-top-01", "poke-top-02", "poke-side-01", "drag-01")
     ]
     assert [window["split"] for window in one["sequences"]] == [
-        *("train", "validation", "train", "train")
+        *("train", "test", "train", "train")
     ]
     assert [touch["landmark"] for touch in one["touches"]] == [f"corner_{n}" for n in range(4)]
     assert all(0.7 < touch["end"] - touch["start"] < 1.5 for touch in one["touches"])
