@@ -53,7 +53,7 @@ def test_streams_sequences_and_doubts_are_printed_and_nothing_is_kept(
     code, out, _ = palpate("look", bench / "bench.bag", "--setup", setup, "--no-serve")
     assert code == 0
     assert re.search(r"/PSM1/measured_cp +pose +2765 +50\.0 Hz +2\.0 ms", out)
-    assert re.search(r"poke-top-02 +top +validation +28\.83 s +34\.28 s", out)
+    assert re.search(r"poke-top-02 +top +test +28\.83 s +34\.28 s", out)
     assert "decided touches.csv: dwells lie as the landmarks do" in out
     assert "warning forces are shown as recorded" in out
     assert list(tmp_path.iterdir()) == []
