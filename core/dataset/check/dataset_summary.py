@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -23,6 +23,10 @@ DROPOUT = 1.8
 """Interval over the median one from which a stamp is missing [1]."""
 AT_REST = 0.2
 """Median interval from which rows are depth steps at rest, between which no row is lost [s]."""
+DEEPEST = 0.6
+"""Depth of the tool from which its place is in doubt, over the phantom's smallest extent [1]."""
+_UNITS = {"decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001}
+"""Units of length that are met in place of the metre [m]."""
 HARMLESS_GAP = 0.02
 """Interval of kinematics and forces in which the tool hardly moves [s]; never a drop-out."""
 
@@ -144,7 +148,7 @@ def check_dataset(
             *(
                 f"{one.name}: {text}"
                 for one in summaries
-                for text in _sequence_doubts(dataset, one)
+                for text in _sequence_doubts(dataset, one, phantom_from_robot)
             ),
         ),
     )
@@ -232,7 +236,9 @@ def _doubts(dataset: Dataset) -> list[str]:
     return doubts
 
 
-def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
+def _sequence_doubts(
+    dataset: Dataset, summary: SequenceSummary, phantom_from_robot: Transform | None
+) -> list[str]:
     """Warnings about one sequence."""
     doubts = []
     if summary.split == "none":
@@ -257,7 +263,10 @@ def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
             f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the "
             "metre?"
         )
-    return doubts + _motion_doubts(dataset, summary.motion)
+    if summary.motion is None or phantom_from_robot is None:
+        return doubts
+    sequence = dataset.sequence(summary.name)
+    return doubts + _motion_doubts(dataset, sequence, summary.motion, phantom_from_robot)
 
 
 def _clock_doubts(summary: SequenceSummary) -> list[str]:
@@ -280,17 +289,34 @@ def _clock_doubts(summary: SequenceSummary) -> list[str]:
     return doubts
 
 
-def _motion_doubts(dataset: Dataset, motion: ToolMotion | None) -> list[str]:
-    if motion is None:
-        return []
+def _motion_doubts(
+    dataset: Dataset, sequence: Sequence, motion: ToolMotion, phantom_from_robot: Transform
+) -> list[str]:
     if not motion.contacts:
+        unit = _other_unit(dataset, sequence, phantom_from_robot)
+        hint = (
+            f"did you write {unit} in kinematics.csv? In that unit it touches"
+            if unit
+            else "are touches and tool radius right?"
+        )
         return [
             f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: "
-            "are touches and tool radius right?"
+            f"{hint}"
         ]
-    if -motion.nearest > 0.6 * min(dataset.config.size):
+    if -motion.nearest > DEEPEST * min(dataset.config.size):
         return [
             f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are "
             "touches, size and radius right?"
         ]
     return []
+
+
+def _other_unit(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform) -> str | None:
+    """The only other unit of the kinematics in which the tool touches the phantom."""
+    found = []
+    for unit, metres in _UNITS.items():
+        path = replace(sequence.kinematics, position=metres * sequence.kinematics.position)
+        moved = describe_motion(dataset, replace(sequence, kinematics=path), phantom_from_robot)
+        if moved.contacts and -moved.nearest < DEEPEST * min(dataset.config.size):
+            found.append(unit)
+    return found[0] if len(found) == 1 else None
