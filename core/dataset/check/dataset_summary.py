@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from palpate.dataset.check.motion_coverage import CoverageGap, coverage_gaps
+from palpate.dataset.check.motion_doubts import motion_doubts
 from palpate.dataset.check.plausibility import frame_notes, implausible_values
 from palpate.dataset.folder import Dataset
 from palpate.dataset.sequence import Sequence
@@ -23,10 +24,8 @@ DROPOUT = 1.8
 """Interval over the median one from which a stamp is missing [1]."""
 AT_REST = 0.2
 """Median interval from which rows are depth steps at rest, between which no row is lost [s]."""
-DEEPEST = 0.6
-"""Depth of the tool from which its place is in doubt, over the phantom's smallest extent [1]."""
-_UNITS = {"decimetres": 0.1, "centimetres": 0.01, "millimetres": 0.001}
-"""Units of length that are met in place of the metre [m]."""
+WEAK = 0.5
+"""Deviation of the forces over their largest change from which they tell little [1]."""
 HARMLESS_GAP = 0.02
 """Interval of kinematics and forces in which the tool hardly moves [s]; never a drop-out."""
 
@@ -210,6 +209,7 @@ def _doubts(dataset: Dataset) -> list[str]:
             'dataset.toml: motion.stamps = "synthetic": the stamps are no measured times, so that '
             "nothing that takes time, such as relaxation, can be told from these data"
         )
+    doubts += _force_doubts(dataset)
     doubts += [f"dataset.toml: {text}" for text in frame_notes(dataset.config)]
     doubts += [
         f"dataset.toml: {text}" for text in implausible_values(dataset.config, dataset.geometry)
@@ -234,6 +234,22 @@ def _doubts(dataset: Dataset) -> list[str]:
             f"{stray} clouds lie in clouds folders without a row in clouds.csv: they are left out"
         )
     return doubts
+
+
+def _force_doubts(dataset: Dataset) -> list[str]:
+    """A warning where forces deviate by as much as they change, by their own statement."""
+    sigma = dataset.config.force_sigma
+    felt = [one.forces.force for one in dataset.loaded if one.forces is not None]
+    if not sigma or not felt:
+        return []
+    largest = max(float(np.linalg.norm(one - np.median(one, axis=0), axis=1).max()) for one in felt)
+    if sigma < WEAK * largest:
+        return []
+    return [
+        f"dataset.toml: force.sigma = {sigma:g} N, and no force changes by more than "
+        f"{largest:.2g} N (over {1 / WEAK:g} times the deviation is expected): these forces tell "
+        "hardly anything of the stiffness; press deeper, or use a sensor"
+    ]
 
 
 def _sequence_doubts(
@@ -266,7 +282,7 @@ def _sequence_doubts(
     if summary.motion is None or phantom_from_robot is None:
         return doubts
     sequence = dataset.sequence(summary.name)
-    return doubts + _motion_doubts(dataset, sequence, summary.motion, phantom_from_robot)
+    return doubts + motion_doubts(dataset, sequence, summary.motion, phantom_from_robot)
 
 
 def _clock_doubts(summary: SequenceSummary) -> list[str]:
@@ -287,36 +303,3 @@ def _clock_doubts(summary: SequenceSummary) -> list[str]:
             f"{summary.clouds.rate:.1f} Hz"
         )
     return doubts
-
-
-def _motion_doubts(
-    dataset: Dataset, sequence: Sequence, motion: ToolMotion, phantom_from_robot: Transform
-) -> list[str]:
-    if not motion.contacts:
-        unit = _other_unit(dataset, sequence, phantom_from_robot)
-        hint = (
-            f"did you write {unit} in kinematics.csv? In that unit it touches"
-            if unit
-            else "are touches and tool radius right?"
-        )
-        return [
-            f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: "
-            f"{hint}"
-        ]
-    if -motion.nearest > DEEPEST * min(dataset.config.size):
-        return [
-            f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are "
-            "touches, size and radius right?"
-        ]
-    return []
-
-
-def _other_unit(dataset: Dataset, sequence: Sequence, phantom_from_robot: Transform) -> str | None:
-    """The only other unit of the kinematics in which the tool touches the phantom."""
-    found = []
-    for unit, metres in _UNITS.items():
-        path = replace(sequence.kinematics, position=metres * sequence.kinematics.position)
-        moved = describe_motion(dataset, replace(sequence, kinematics=path), phantom_from_robot)
-        if moved.contacts and -moved.nearest < DEEPEST * min(dataset.config.size):
-            found.append(unit)
-    return found[0] if len(found) == 1 else None
