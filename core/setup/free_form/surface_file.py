@@ -202,7 +202,7 @@ def _split_corners(vertices: FloatArray, lone: IntArray) -> float | None:
     shortest = float(np.linalg.norm(vertices[lone[:, 0]] - vertices[lone[:, 1]], axis=1).min())
     if shortest < 10 * _NEAR:
         return None
-    apart = cKDTree(vertices[on]).query(vertices[on], k=2)[0][:, 1]
+    apart = np.asarray(cKDTree(vertices[on]).query(vertices[on], k=2)[0])[:, 1]
     return float(apart.max()) if (apart <= _NEAR).all() else None
 
 
