@@ -69,6 +69,11 @@ def force_doubts(dataset: Dataset, phantom_from_robot: Transform) -> tuple[str, 
     """Sentences about forces that do not belong to the pushes as recorded."""
     felt = []
     for name, stream in _streams(dataset).items():
+        spread = float(
+            np.sqrt(((stream.force - stream.force.mean(axis=0)) ** 2).sum(axis=1).mean())
+        )
+        if stream.sigma > spread:  # the stated deviation explains whatever they disagree in
+            continue
         if _constant(stream).all() or not 1 / LONGEST < _duration(dataset, name) < LONGEST:
             continue
         one = FeltMotion.of(dataset, dataset.sequence(name), phantom_from_robot)

@@ -145,7 +145,7 @@ def check_coordinates(file: str, points: FloatArray, first_row: int = FIRST_ROW)
         if math.isfinite(value):
             advice = (
                 f" m; expected metres, at most {LARGEST_COORDINATE:g} m from the origin: did "
-                "you write millimetres?"
+                "you write millimetres or centimetres?"
             )
         else:
             advice = (

@@ -40,7 +40,7 @@ LARGEST_FORCE = 1000.0
 SLOWEST_STEP = 0.5
 """Largest step of a stream of the kinematics [s]; a larger one is of depth steps at rest, or has
 another unit."""
-SHORTEST = 1.0
+SHORTEST = 0.3
 """Least duration of a recording [s]: rows that would last less in milliseconds are in seconds."""
 
 

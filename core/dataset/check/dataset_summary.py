@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.dataset.check.motion_coverage import CoverageGap, coverage_gaps
+from palpate.dataset.check.motion_doubts import motion_doubts
 from palpate.dataset.check.plausibility import frame_notes, implausible_values
 from palpate.dataset.folder import Dataset
 from palpate.dataset.sequence import Sequence
@@ -23,6 +24,8 @@ DROPOUT = 1.8
 """Interval over the median one from which a stamp is missing [1]."""
 AT_REST = 0.2
 """Median interval from which rows are depth steps at rest, between which no row is lost [s]."""
+WEAK = 0.5
+"""Deviation of the forces over their largest change from which they tell little [1]."""
 HARMLESS_GAP = 0.02
 """Interval of kinematics and forces in which the tool hardly moves [s]; never a drop-out."""
 
@@ -144,7 +147,7 @@ def check_dataset(
             *(
                 f"{one.name}: {text}"
                 for one in summaries
-                for text in _sequence_doubts(dataset, one)
+                for text in _sequence_doubts(dataset, one, phantom_from_robot)
             ),
         ),
     )
@@ -206,6 +209,7 @@ def _doubts(dataset: Dataset) -> list[str]:
             'dataset.toml: motion.stamps = "synthetic": the stamps are no measured times, so that '
             "nothing that takes time, such as relaxation, can be told from these data"
         )
+    doubts += _force_doubts(dataset)
     doubts += [f"dataset.toml: {text}" for text in frame_notes(dataset.config)]
     doubts += [
         f"dataset.toml: {text}" for text in implausible_values(dataset.config, dataset.geometry)
@@ -232,7 +236,25 @@ def _doubts(dataset: Dataset) -> list[str]:
     return doubts
 
 
-def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
+def _force_doubts(dataset: Dataset) -> list[str]:
+    """A warning where forces deviate by as much as they change, by their own statement."""
+    sigma = dataset.config.force_sigma
+    felt = [one.forces.force for one in dataset.loaded if one.forces is not None]
+    if not sigma or not felt:
+        return []
+    largest = max(float(np.linalg.norm(one - np.median(one, axis=0), axis=1).max()) for one in felt)
+    if sigma < WEAK * largest:
+        return []
+    return [
+        f"dataset.toml: force.sigma = {sigma:g} N, and no force changes by more than "
+        f"{largest:.2g} N (over {1 / WEAK:g} times the deviation is expected): these forces tell "
+        "hardly anything of the stiffness; press deeper, or use a sensor"
+    ]
+
+
+def _sequence_doubts(
+    dataset: Dataset, summary: SequenceSummary, phantom_from_robot: Transform | None
+) -> list[str]:
     """Warnings about one sequence."""
     doubts = []
     if summary.split == "none":
@@ -257,7 +279,10 @@ def _sequence_doubts(dataset: Dataset, summary: SequenceSummary) -> list[str]:
             f"the tool moves by {1e3 * extent:.3f} mm only: is the unit of kinematics.csv the "
             "metre?"
         )
-    return doubts + _motion_doubts(dataset, summary.motion)
+    if summary.motion is None or phantom_from_robot is None:
+        return doubts
+    sequence = dataset.sequence(summary.name)
+    return doubts + motion_doubts(dataset, sequence, summary.motion, phantom_from_robot)
 
 
 def _clock_doubts(summary: SequenceSummary) -> list[str]:
@@ -278,19 +303,3 @@ def _clock_doubts(summary: SequenceSummary) -> list[str]:
             f"{summary.clouds.rate:.1f} Hz"
         )
     return doubts
-
-
-def _motion_doubts(dataset: Dataset, motion: ToolMotion | None) -> list[str]:
-    if motion is None:
-        return []
-    if not motion.contacts:
-        return [
-            f"the tool never touches the phantom, it stays {1e3 * motion.nearest:.1f} mm away: "
-            "are touches and tool radius right?"
-        ]
-    if -motion.nearest > 0.6 * min(dataset.config.size):
-        return [
-            f"the tool goes {-1e3 * motion.nearest:.1f} mm into the phantom as stated: are "
-            "touches, size and radius right?"
-        ]
-    return []

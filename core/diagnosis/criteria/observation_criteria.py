@@ -172,8 +172,8 @@ class ForceErrorCriteria:
         0.15,
         "1",
         "Standard deviation of what is left of a push's fitted constant, over its largest force.",
-        "derived: where the force goes with the depth to the power of 1.3 to 1.7 in place of 1.5, "
-        "as over thin and stiffening bodies, the fitted constant is 10 to 15 % off",
+        "derived: where the force goes with the depth to the power of 1 to 2 in place of 1.5, or "
+        "the depth is a tenth off, the fitted constant is 3 to 14 % off",
     )
 
 

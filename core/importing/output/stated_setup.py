@@ -93,20 +93,35 @@ def write_setup(
     writer: DatasetWriter, mapping: ImportMapping, splits: dict[str, list[str]], base: Path
 ) -> None:
     """Write dataset.toml and copy the files that it names, touches and traces."""
-    values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup, "splits": splits}
+    phantom = dict(mapping.setup["phantom"])
+    # A preset names a surface among the recordings, whatever folder states the rest.
+    homes = [base / mapping.setup_folder]
+    homes += [(base / one.files[0]).parent for one in mapping.recordings]
+    for key in SURFACES:
+        if key in phantom:
+            phantom[key] = _copied(writer, phantom[key], homes)
+    values: dict[str, Any] = {"format": 1, "name": mapping.name, **mapping.setup}
+    values |= {"phantom": phantom, "splits": splits}
     if mapping.wrench.estimated and mapping.streams.wrench:
         values["force"] = {"sigma": ESTIMATED_SIGMA, **mapping.setup.get("force", {})}
     if any(rules.rows == "depth-steps" for rules in mapping.tables.values()):
         values["motion"] = {"stamps": "synthetic", **mapping.setup.get("motion", {})}
     writer.text("dataset.toml", toml_text(values))
-    home = base / mapping.setup_folder
-    for key in SURFACES:
-        named = mapping.setup["phantom"].get(key, [])
-        for file in [named] if isinstance(named, str) else named:
-            writer.copied(file, home / file)
     for file, source in (("touches.csv", mapping.touches), ("traces.csv", mapping.traces)):
         if source:
             writer.copied(file, base / source)
+
+
+def _copied(writer: DatasetWriter, named: Any, homes: list[Path]) -> Any:
+    """Copy a file, or each of a list, into the dataset; return its name there."""
+    if not isinstance(named, str):
+        return [_copied(writer, file, homes) for file in named]
+    places = [home / named for home in homes]
+    source = next((one for one in places if one.is_file()), places[0])
+    inside = not Path(named).is_absolute() and ".." not in Path(named).parts
+    name = Path(named).name if inside else named
+    writer.copied(name, source)
+    return name
 
 
 def found_phantom(

@@ -15,6 +15,7 @@ import numpy as np
 from palpate.foundation.arrays import BoolArray, FloatArray, IntArray
 from palpate.importing.clocks.track import Stamps
 from palpate.importing.rules import ColumnRules
+from palpate.importing.tables.table_columns import JUMP
 from palpate.importing.tables.table_rotation import row_quaternions
 from palpate.importing.tables.table_text import TextTable
 from palpate.importing.tables.table_units import METRES, NEWTONS
@@ -28,8 +29,6 @@ HOVER = 0.01
 """Height above a push from which it begins [m]."""
 SPEED = 0.004
 """Speed of the ways in and out [m/s]."""
-JUMP = 4.0
-"""Ratio of a step to the median one from which it leads to another push [1]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from palpate.importing.rules import ColumnRules
 from palpate.importing.tables.table_rotation import ANGLES, NAMED, ORDERED
 from palpate.importing.tables.table_text import TextTable
 
-__all__ = ["ProposedColumns", "proposed_columns"]
+__all__ = ["JUMP", "ProposedColumns", "proposed_columns"]
 
 _UNIT = re.compile(r"[\[( _]+(ns|us|µs|ms|sec|s|mm|cm|m|mN|N|deg|rad)[\])]*$")
 _PATTERNS = {
@@ -51,6 +51,10 @@ _LARGEST_RADIANS = 2 * np.pi + 0.1
 """Largest angle that is one in radians; controllers state them within a turn."""
 _SLOW, _SLOWEST = 0.5, 5.0
 """Step from which rows are depth steps [s], and from which it may be milliseconds of a stream."""
+JUMP = 4.0
+"""Ratio of a step to the median one from which it leads to another push [1]."""
+_MOST_STEPS = 100
+"""Depth steps of one push up to which rows without a time are pushes."""
 _REPEATS = 0.05
 """Share of stamps that do not increase above which they are no times [1]."""
 _PREFIXES = re.compile(
@@ -100,13 +104,26 @@ def _is_at_rest(table: TextTable, found: dict[str, str]) -> bool:
     """
     if not {"x", "y", "z", "fx", "fy", "fz"} <= set(found) or "received" in found:
         return False
+    told = "push" in found or {"nx", "ny", "nz"} <= set(found)
     if "t" not in found:
-        return True
-    if "push" not in found and not {"nx", "ny", "nz"} <= set(found):
+        return told or _jumps_between_pushes(table, found)
+    if not told:
         return False
     steps = np.diff(table.numbers(found["t"].split("+")[0]))
     # Quicker than that the rows are a stream, in whatever unit.
     return bool((steps <= 0).mean() > _REPEATS or _SLOW < np.median(steps) < _SLOWEST)
+
+
+def _jumps_between_pushes(table: TextTable, found: dict[str, str]) -> bool:
+    """Whether places go on in small steps and jump now and then, as from push to push."""
+    places = np.stack([table.numbers(found[axis]) for axis in "xyz"], axis=-1)
+    places = places[np.isfinite(places).all(axis=1) & (places != 0).any(axis=1)]
+    if len(places) < 4:
+        return False
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    usual = float(np.median(steps))
+    jumps = int((steps > JUMP * usual).sum())
+    return usual > 0 and jumps > 0 and len(places) / (jumps + 1) < _MOST_STEPS
 
 
 def _rotation(

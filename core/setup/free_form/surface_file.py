@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from palpate.foundation.arrays import FloatArray, IntArray
 from palpate.foundation.errors import MeshError
@@ -23,6 +24,9 @@ __all__ = ["FORMATS", "check_surface", "read_numbered_surface", "read_surface"]
 
 _FLAT = 1e-9
 """Height of a triangle over its longest side below which it has no area [1]."""
+_NEAR = 1e-6
+"""Distance up to which corners of triangles that meet are one corner [m]: rounding of a float to
+six digits moves them less."""
 _SMALLEST, _LARGEST = 1e-3, 2.0
 """Smallest and largest extent of a phantom along any axis [m]: as for a block."""
 
@@ -155,6 +159,17 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
         hole = connected_components(graph, directed=False)[1][lone[:, 0]]
         names, sizes = np.unique(hole, return_counts=True)
         largest = np.unique(lone[hole == names[np.argmax(sizes)]])
+        apart = _split_corners(vertices, lone)
+        if apart is not None:
+            raise MeshError(
+                f"{name}: is open: {len(lone)} of {len(ends)} edges belong to one triangle only, "
+                f"since triangles that meet have corners of their own, up to {apart:.1g} m apart; "
+                "expected shared corners: merge them, "
+                f"{remedy(name, '--clean')}",
+                file=name,
+                open_edges=len(lone),
+                apart=apart,
+            )
         raise MeshError(
             f"{name}: is open: {len(lone)} of {len(ends)} edges belong to one triangle only, "
             f"around {len(names)} hole(s), the largest of {sizes.max()} edges at "
@@ -177,6 +192,18 @@ def _check_closed(name: str, vertices: FloatArray, ends: IntArray, uses: IntArra
             edges=len(shared),
             place=place.tolist(),
         )
+
+
+def _split_corners(vertices: FloatArray, lone: IntArray) -> float | None:
+    """Largest distance [m] of corners on open edges (k, 2) that lie together in pairs; None where
+    they do not, as around a hole.
+    """
+    on = np.unique(lone)
+    shortest = float(np.linalg.norm(vertices[lone[:, 0]] - vertices[lone[:, 1]], axis=1).min())
+    if shortest < 10 * _NEAR:
+        return None
+    apart = np.asarray(cKDTree(vertices[on]).query(vertices[on], k=2)[0])[:, 1]
+    return float(apart.max()) if (apart <= _NEAR).all() else None
 
 
 def _check_winding(

@@ -132,3 +132,19 @@ def test_verbs_open_a_dataset_with_bags(
     (bags / "sequences" / "poke-01.bag").write_bytes(b"no bag")
     code, _, err = palpate("check", bags)
     assert code == 2 and "poke-01.bag cannot be read" in err
+
+
+def test_tables_are_shown_as_they_are_understood(palpate: Palpate, tmp_path: Path) -> None:
+    rows = [f"{0.01 * at:.2f},{100 + 9 * at},0,50,90,0,0,1" for at in range(40)]
+    header = "t,x (mm),y (mm),z (mm),roll (deg),pitch (deg),yaw (deg),gripper"
+    (tmp_path / "poses.csv").write_text("\n".join([header, *rows]) + "\n")
+    code, out, _ = palpate("import", tmp_path / "poses.csv")
+    assert code == 0
+    assert "first of 40 rows, as they are understood" in out
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert "x [m] x (mm) mm 0.1, 0.109, 0.118" in lines
+    assert "qx roll (deg), pitch (deg), yaw (deg) euler-xyz deg 0.7071, 0.7071, 0.7071" in lines
+    assert "not used: gripper" in out
+    code, _, err = palpate("import", tmp_path / "poses.csv", "--preset", "gel")
+    assert code == 2
+    assert "there is no preset 'gel'; expected simulator-network, pokeflex" in err

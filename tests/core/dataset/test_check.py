@@ -153,6 +153,23 @@ def test_a_tool_that_never_touches_gives_a_warning_with_its_distance(folder: Pat
     )
 
 
+@pytest.mark.parametrize(("unit", "per_metre"), [("decimetres", 10.0), ("centimetres", 100.0)])
+def test_kinematics_in_another_unit_are_named_where_the_tool_touches_in_it_alone(
+    folder: Path, unit: str, per_metre: float
+) -> None:
+    here = registration(folder)
+    beside = Transform(here.rotation, np.array([0.06, 0.05, 0.07]))
+    for path in sorted(folder.glob("sequences/*/kinematics.csv")):
+        header, *rows = path.read_text().splitlines()
+        table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+        table[:, 1:4] = per_metre * beside.inverse().apply(here.apply(table[:, 1:4]))
+        lines = [",".join(f"{value:.9g}" for value in row) for row in table]
+        path.write_text("\n".join([header, *lines]) + "\n")
+    summary = check_dataset(open_dataset(folder), beside)
+    told = [text for text in summary.warnings if text.startswith("poke-01: the tool never touches")]
+    assert told and f"did you write {unit} in kinematics.csv?" in told[0]
+
+
 def test_a_tool_that_hardly_moves_gives_a_warning_with_its_path(folder: Path) -> None:
     path = folder / POKE / "kinematics.csv"
     header, *rows = path.read_text().splitlines()

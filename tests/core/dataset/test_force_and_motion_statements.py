@@ -27,6 +27,15 @@ def test_the_stated_deviation_is_that_of_all_forces(tmp_path: Path) -> None:
     assert found and set(found) == {2.0}
 
 
+def test_forces_that_deviate_by_as_much_as_they_change_are_told(tmp_path: Path) -> None:
+    root = stated(tmp_path / "block", "[force]\nsigma = 2.0\n")
+    assert any("force.sigma = 2 N" in text for text in check_dataset(open_dataset(root)).warnings)
+    file = root / "dataset.toml"
+    file.write_text(file.read_text().replace("sigma = 2.0\n", "sigma = 1e-3\n"))
+    told = check_dataset(open_dataset(root)).warnings
+    assert not any("force.sigma" in text for text in told)
+
+
 @pytest.mark.parametrize("value", ["-1.0", "1e6", '"large"'])
 def test_a_deviation_out_of_bounds_is_named(tmp_path: Path, value: str) -> None:
     with pytest.raises(DatasetError, match=r"force.sigma = .* expected a number from 0 to 100 N"):

@@ -10,6 +10,7 @@ from small_dataset import SIZE, write_valid_dataset
 
 from palpate.dataset import Dataset, Kinematics, Sequence, open_dataset
 from palpate.dataset.tool_motion import describe_motion
+from palpate.dataset.tool_smoothing import SMOOTHING, averaged
 from palpate.foundation.frames import Transform
 
 TOP, RADIUS = SIZE[2], 0.005
@@ -101,3 +102,20 @@ def test_the_rest_after_release_is_counted_to_the_last_cloud(dataset: Dataset) -
     motion = describe_motion(dataset, moving(above, low, above, above, above), Transform())
     np.testing.assert_allclose(motion.rest_after, 4.0 + 2.0 * 9.5 / 15, atol=0.15)
     assert motion.untouched_after == pytest.approx(10 * motion.rest_after, abs=1)
+
+
+@pytest.mark.parametrize("rate", [2.0, 10.0, 25.0, 100.0, 1000.0])
+def test_averages_are_exact_whatever_the_rate_of_the_stream(rate: float) -> None:
+    time = np.arange(0.0, 4.0, 1 / rate)
+    line = np.stack([3 * time, 1 - time], axis=-1)
+    times = np.linspace(SMOOTHING, time[-1] - SMOOTHING, 57)
+    expected = np.stack([3 * times, 1 - times], axis=-1)
+    np.testing.assert_allclose(averaged(time, line, times), expected, atol=1e-9)
+    corner = np.abs(time - 2.0)[:, None]
+    at = averaged(time, corner, np.array([2.0]))[0, 0]
+    assert at == pytest.approx(SMOOTHING / 2, abs=1e-9)
+
+
+def test_a_stream_of_one_row_is_its_own_average() -> None:
+    found = averaged(np.array([1.0]), np.array([[2.0, 3.0]]), np.array([0.0, 1.0, 5.0]))
+    np.testing.assert_array_equal(found, [[2.0, 3.0]] * 3)

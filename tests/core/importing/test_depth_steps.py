@@ -152,3 +152,11 @@ def test_rows_with_slow_stamps_are_depth_steps_and_quick_ones_a_stream(tmp_path:
         table = np.column_stack([step * np.arange(len(rows())), rows()])
         folder = written(tmp_path / f"raw-{step}", table, f"t,{HEADER}")
         assert isinstance(open_source(folder / "probing.csv"), ProbingSource) == at_rest
+
+
+def test_a_stream_without_times_is_no_push(tmp_path: Path) -> None:
+    path = np.column_stack([np.zeros((400, 2)), 0.1 + 0.02 * np.sin(0.05 * np.arange(400))])
+    table = np.column_stack([path, np.ones((400, 3))])
+    folder = written(tmp_path / "raw", table, "x,y,z,fx,fy,fz")
+    source = open_source(folder / "probing.csv")
+    assert [one.kind for one in source.streams()] == ["other"]

@@ -210,6 +210,23 @@ def test_a_take_of_poke_flex_is_read_frame_by_frame(tmp_path: Path) -> None:
     found.close()
 
 
+def test_a_take_of_poke_flex_becomes_a_dataset_with_what_is_not_published(tmp_path: Path) -> None:
+    root, notes = poke_flex_take(tmp_path / "take-1"), ImportNotes()
+    stated = '[phantom]\nmass = 0.05\n[tool]\nshape = "sphere"\nradius = 0.005\n'
+    (tmp_path / "dataset.toml").write_text(stated)
+    found = survey([root], tmp_path / "dataset.toml")
+    mapping = found.proposal("dice", notes)
+    found.close()
+    wrench = mapping.wrench.model_copy(update={"frame": "robot"})
+    mapping = mapping.model_copy(update={"wrench": wrench})
+    import_recordings(mapping, tmp_path, tmp_path / "made", notes)
+    dataset = open_dataset(tmp_path / "made")
+    assert dataset.config.size == pytest.approx((0.06, 0.04, 0.04))  # y of the file is up
+    sequence = dataset.sequence(dataset.sequences[0])
+    assert len(sequence) == 3 and sequence.forces is not None
+    assert sequence.forces.force[:, 1].tolist() == [4.0, 8.0, 12.0]
+
+
 def poses_time(found: Any) -> int:
     return int(next(iter(found.recordings[0].samples("robot_data.json#pose"))).stamped)
 

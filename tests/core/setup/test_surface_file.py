@@ -60,6 +60,16 @@ def test_hole_is_reported_with_its_open_edges_and_place(tmp_path):
         load_shape(_stored(tmp_path, vertices, triangles[~top]))
 
 
+def test_corners_that_nearly_meet_are_to_be_merged_and_no_holes(tmp_path):
+    vertices, triangles = box_surface(SIZE)
+    corners = vertices[triangles].reshape(-1, 3)
+    moved = corners + 2e-8 * np.random.default_rng(0).uniform(-1, 1, corners.shape)
+    with pytest.raises(MeshError, match=r"is open: 36 of 36 .* own, up to \S+ m apart.* --clean"):
+        Shape(moved, np.arange(len(moved)).reshape(-1, 3))
+    with pytest.raises(MeshError, match=r"hole\(s\)"):  # apart by 0.1 mm: these are holes
+        Shape(moved + 5e3 * (moved - corners), np.arange(len(moved)).reshape(-1, 3))
+
+
 def test_flipped_triangle_is_reported_with_its_number():
     vertices, triangles = box_surface(SIZE)
     triangles[7] = triangles[7][::-1]
