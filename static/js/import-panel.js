@@ -77,11 +77,12 @@ export function lookAtDataset(name) {
 /**
  * Bring the panel to the front and take files that were dropped.
  * @param {File[]} files
+ * @param {string[]} folders names of folders among what was dropped, which cannot be sent
  */
-export function takeFiles(files) {
+export function takeFiles(files, folders) {
   openPanel("import");
   if (work.view.look) work.actions.startOver();
-  work.actions.addFiles(files);
+  work.actions.addFiles(files, folders);
 }
 
 /** Show scene and timeline of the look in place of those of a run. */
@@ -201,6 +202,7 @@ function onKeyDown(event) {
   const target = /** @type {Element | null} */ (event.target);
   if (target?.matches?.("input, select, textarea, pre")) return;
   if ([" ", "Enter"].includes(event.key) && target?.matches?.("button, summary, a")) return;
+  if (["Home", "End"].includes(event.key) && target && box.contains(target)) return;
   if (!pressKey(event)) return;
   event.preventDefault();
   event.stopImmediatePropagation();

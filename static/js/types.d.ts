@@ -774,7 +774,7 @@ export interface ImportView {
 
 export interface ImportActions {
   redraw: () => void;
-  addFiles: (files: Iterable<File>) => void;
+  addFiles: (files: Iterable<File>, folders?: string[]) => void;
   addPath: (path: string) => void;
   removeFile: (key: number) => void;
   startLook: () => void;
