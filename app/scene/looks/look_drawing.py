@@ -96,7 +96,7 @@ class LookDrawing:
         """Place (3,) [m] of the depth camera, frame of the scene."""
         if self.look["eye"] is not None and self.look["frame"] == "phantom":
             return np.array(self.look["eye"], dtype=float)
-        return np.asarray(self.upright.apply(np.zeros(3))) + np.array([0.0, -1.0, 0.0])
+        return np.array([0.0, -1.0, 0.0]) + self.upright.translation
 
     @cached_property
     def surface(self) -> LookSurface | None:
