@@ -26,6 +26,8 @@ let box;
 /** @type {ReturnType<typeof createImport>} */
 let work;
 let waiting = false; // a drawing of the panel is due
+/** @type {EventTarget | null} */
+let taken = null; // the field whose value was taken since the last drawing
 
 /**
  * Add the panel, its scene and its timeline.
@@ -51,6 +53,9 @@ export function startImports(openDataset) {
       field?.select();
     },
   });
+  box.addEventListener("change", ({ target }) => {
+    taken = target;
+  });
   window.addEventListener("keydown", onKeyDown, true);
   onLookSceneKey(onKeyDown);
   addResultOpener("look", "Open the look", openLook);
@@ -75,12 +80,20 @@ export function lookAtDataset(name) {
 }
 
 /**
- * Bring the panel to the front and take files that were dropped.
+ * Bring the panel to the front and take files that were dropped: a single .toml beside a look is
+ * its setup, all else are new recordings.
  * @param {File[]} files
  * @param {string[]} folders names of folders among what was dropped, which cannot be sent
  */
 export function takeFiles(files, folders) {
   openPanel("import");
+  const [first] = files;
+  if (work.recording() && files.length === 1 && first.name.endsWith(".toml")) {
+    first
+      .text()
+      .then((text) => work.actions.setSetup({ kind: "file", name: first.name, text }), toast);
+    return;
+  }
   if (work.view.look) work.actions.startOver();
   work.actions.addFiles(files, folders);
 }
@@ -164,9 +177,10 @@ function keepingFocus(drawPanel) {
     ? /** @type {HTMLElement} */ (document.activeElement)
     : null;
   const key = active?.dataset.key;
-  const typed = active instanceof HTMLInputElement && active.type === "text" ? active : null;
-  const marks = typed ? [typed.selectionStart, typed.selectionEnd] : null;
-  const value = typed?.value;
+  const typed = active instanceof HTMLInputElement && active.type !== "file" ? active : null;
+  const marks = typed?.type === "text" ? [typed.selectionStart, typed.selectionEnd] : null;
+  const value = typed === taken ? undefined : typed?.value;
+  taken = null;
   const closed = new Map(
     [...box.querySelectorAll("details")].map((one) => [summaryOf(one), one.open]),
   );
@@ -180,10 +194,9 @@ function keepingFocus(drawPanel) {
     box.querySelector(`[data-key="${CSS.escape(key)}"]`)
   );
   again?.focus({ preventScroll: true });
-  if (again instanceof HTMLInputElement && marks) {
-    if (value !== undefined && key === "path") again.value = value;
-    again.setSelectionRange(marks[0], marks[1]);
-  }
+  if (!(again instanceof HTMLInputElement)) return;
+  if (value !== undefined) again.value = value;
+  if (marks) again.setSelectionRange(marks[0], marks[1]);
 }
 
 /**
