@@ -75,6 +75,7 @@ export function finishSection(view, editor, actions, problems) {
       ),
     ),
     problems.name,
+    job?.kind === "import" ? jobSection(view, actions) : null,
     why ? element("p", { class: "import-hint", id: "import-obstacle" }, why) : null,
     problems.other,
     imported

@@ -21,11 +21,15 @@ import {
 import { drawTimeline, forgetView, pressKey, startLookTimeline } from "./look-timeline.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 
+/** @import { ServerError } from "./types.js" */
+
 /** @type {HTMLElement} */
 let box;
 /** @type {ReturnType<typeof createImport>} */
 let work;
 let waiting = false; // a drawing of the panel is due
+/** @type {ServerError | null} */
+let said = null; // the problem that was brought into sight
 /** @type {EventTarget | null} */
 let taken = null; // the field whose value was taken since the last drawing
 
@@ -146,17 +150,20 @@ function draw() {
         element("div", { class: "eyebrow" }, "Import"),
         element("h1", { class: "verdict" }, title()),
         filesSection(view, actions, at("files")),
-        jobSection(view, actions),
+        view.job?.kind === "import" ? null : jobSection(view, actions),
         streamsSection(view, actions, at("streams")),
         setupSection(view, actions, at("setup")),
         meaningSection(view, actions, at("meaning")),
-        cutSection(view, editor, work.sequences(recording?.name ?? ""), actions, at("cut")),
+        cutSection(view, editor, work.sequences, actions, at("cut")),
         finishSection(view, editor, actions, { name: at("name"), other: at("other") }),
       );
     } catch (problem) {
       fill(box, errorCard(problem));
     }
   });
+  if (view.problem && view.problem !== said)
+    box.querySelector("[data-problem]")?.scrollIntoView({ block: "center" });
+  said = view.problem;
 }
 
 /** @returns {string} */

@@ -245,8 +245,10 @@ function noteText() {
 
 /** @param {string} layer */
 function toggle(layer) {
-  if (layers.has(layer)) layers.delete(layer);
+  const shown = isShown(layer);
+  if (shown) layers.delete(layer);
   else layers.add(layer);
+  if (shown && layer === "raw") layers.delete("cleaned");
   // The cloud is drawn once: as it was measured, or coloured by reason.
   if (layers.has(layer) && layer === "raw") layers.delete("cleaned");
   if (layers.has(layer) && layer === "cleaned") layers.delete("raw");

@@ -786,7 +786,7 @@ export interface ImportActions {
   setSetup: (setup: ImportSetup) => void;
   setMeaning: (key: string, value: string) => void;
   lookAgain: () => void;
-  chooseRecording: (index: number) => void;
+  chooseRecording: (index: number, time?: number) => void;
   goTo: (time: number) => void;
   startImport: () => void;
   openDataset: (name: string) => void;
