@@ -128,6 +128,10 @@ def test_what_cannot_be_drawn_of_a_recording_without_a_setup_is_said(scenes: Loo
     assert set(scene.pictures[-1].figures) == {"cloud"}
     # The camera looks along its z; upright, that is y, and the lowest points lie on z = 0.
     assert np.ptp(cloud.points[:, 1]) < 0.02 < np.ptp(cloud.points[:, 2])
+    said = scenes.open(page).show(LookView(look="bench", layers=("tool", "path", "surface")))
+    assert said["frame"] == "robot" and set(scene.pictures[-1].figures) == {"tool", "path"}
+    assert said["cannot"] == {"surface": "No phantom is stated."} and len(scene.looked_from) == 2
+    assert scene.pictures[-1].figures["path"].segments[..., 2].min() == pytest.approx(0, abs=1e-6)
     with pytest.raises(Missing, match="no recording none"):
         scenes.open(page).show(LookView(look="bench", recording="none"))
     with pytest.raises(Missing, match="no look gone"):
