@@ -54,7 +54,7 @@ export function streamsSection(view, actions, problem) {
           "tr",
           {},
           element("th", { scope: "col" }, "Name, kind and type"),
-          element("th", { scope: "col", class: "number" }, "Samples, rate"),
+          element("th", { scope: "col", class: "number" }, "Count, rate"),
           element("th", { scope: "col" }, "Frame, delay"),
           element("th", { scope: "col" }, "Taken as"),
         ),
@@ -98,7 +98,7 @@ function streamRow(stream, { look, job }, actions) {
       "td",
       { class: "number" },
       String(samples),
-      element("small", {}, rate && rate < 1e6 ? `${rate.toFixed(1)} Hz` : "–"),
+      element("small", {}, rate && rate < 1e6 ? `${rate.toFixed(rate < 100 ? 1 : 0)} Hz` : "–"),
     ),
     element(
       "td",
@@ -175,7 +175,7 @@ const told = ({ recordings }, sentences) =>
  */
 const formatDelay = (seconds) =>
   seconds === null
-    ? "not received"
+    ? "–"
     : Math.abs(seconds) > OTHER_CLOCK
       ? "another clock"
       : `${(1e3 * seconds).toFixed(1)} ms`;
