@@ -21,7 +21,7 @@ MOST_POINTS = 8000
 _STATED = {
     "kept": ("kept as the phantom's", "#e09820"),
     "table": ("on the table", "#8a919c"),
-    "tool": ("on the tool's ball, or beside it", "#c2410c"),
+    "tool": ("on the tool, or beside its axis", "#c2410c"),
     "shaft": ("on the tool's shaft", "#7c3aed"),
     "background": ("away from the phantom", "#b4bac2"),
     "stray": ("stray, with hardly a neighbour", "#db2777"),

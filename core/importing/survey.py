@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.dataset.files import read_toml
+from palpate.dataset.sequence import CLOUDS, FORCES, KINEMATICS
 from palpate.foundation.errors import DatasetError
 from palpate.importing.cutting.probing_sequences import with_probing
 from palpate.importing.import_notes import ImportNotes
@@ -26,7 +27,8 @@ from palpate.importing.tables.table_evidence import TableEvidence
 __all__ = ["Survey", "read_setup", "survey"]
 
 _SETUP = "dataset.toml"
-_TABLES = ("kinematics.csv", "clouds.csv", "forces.csv")
+_TABLES = {"kinematics.csv": KINEMATICS, "clouds.csv": CLOUDS, "forces.csv": FORCES}
+"""Tables of a sequence, and their headers."""
 _BAGS = (".bag", ".db3", ".mcap")
 _LIMIT = 2**20
 
@@ -184,10 +186,22 @@ def _take_dataset(found: Survey, folder: Path) -> None:
         if place.is_dir() and not is_source(place):
             tables = [place / name for name in _TABLES if (place / name).is_file()]
             if tables:
-                sources = tuple(open_source(table) for table in tables)
+                sources = tuple(open_source(table, _format_columns(table)) for table in tables)
                 found.recordings.append(Recording(recording_name(place), sources))
         elif place.is_dir() or place.suffix in _BAGS:
             found.recordings.append(Recording(recording_name(place), (open_source(place),)))
+
+
+def _format_columns(table: Path) -> ColumnRules | None:
+    """Columns and units of a table that has the header of the dataset format; None for others,
+    whose columns are to be proposed.
+    """
+    header = _TABLES[table.name]
+    with table.open("rb") as stream:
+        first = stream.readline(4096).decode("utf-8-sig", "replace").strip()
+    if first != header:
+        return None
+    return ColumnRules(columns={name: name for name in header.split(",")}, time_unit="s")
 
 
 def read_setup(found: Survey, path: Path) -> None:

@@ -3,7 +3,11 @@
 import { element, icon } from "./dom.js";
 import { KINDS } from "./look-timeline-readings.js";
 
-/** @import { CutEditor, CutKind, CutSequence, ImportActions, ImportView } from "./types.js" */
+/**
+ * @import {
+ *   CutEditor, CutKind, CutSequence, ImportActions, ImportView, LookRecording
+ * } from "./types.js"
+ */
 
 /** @type {Record<string, string>} */
 export const SPLITS = {
@@ -16,16 +20,16 @@ export const SPLITS = {
 /**
  * @param {ImportView} view
  * @param {CutEditor | null} editor null where nothing can be changed
- * @param {CutSequence[]} sequences of the recording that is shown
+ * @param {(recording: string) => CutSequence[]} sequencesOf
  * @param {ImportActions} actions
  * @param {HTMLElement | null} problem
  * @returns {HTMLElement | null}
  */
-export function cutSection(view, editor, sequences, actions, problem) {
+export function cutSection(view, editor, sequencesOf, actions, problem) {
   const { look } = view;
-  const recording = look?.recordings[view.recording];
-  if (!look || !recording) return null;
+  if (!look?.recordings.length) return null;
   const fixed = look.source.kind === "dataset";
+  const sequences = look.recordings.flatMap(({ name }) => sequencesOf(name));
   return element(
     "section",
     { class: "import-step", "aria-label": "Sequences" },
@@ -44,7 +48,7 @@ export function cutSection(view, editor, sequences, actions, problem) {
     element(
       "ul",
       { class: "cut-list" },
-      sequences.map((one) => row(one, recording.start, editor, actions)),
+      sequences.map((one) => row(one, look.recordings, editor, actions)),
     ),
     sequences.length
       ? null
@@ -69,13 +73,15 @@ export function cutSection(view, editor, sequences, actions, problem) {
 
 /**
  * @param {CutSequence} one
- * @param {number} zero start of the recording [s]
+ * @param {LookRecording[]} recordings
  * @param {CutEditor | null} editor
  * @param {ImportActions} actions
  * @returns {HTMLElement}
  */
-function row(one, zero, editor, actions) {
+function row(one, recordings, editor, actions) {
   const { key, name, kind, start, end, split } = one;
+  const at = recordings.findIndex((other) => other.name === one.recording);
+  const zero = recordings[at]?.start ?? 0;
   const chosen = editor?.selected === key;
   const wrong = editor?.problems().filter((problem) => problem.key === key) ?? [];
   const line = element(
@@ -85,9 +91,10 @@ function row(one, zero, editor, actions) {
       type: "button",
       "aria-expanded": editor ? String(chosen) : null,
       "data-key": `cut ${key}`,
+      title: recordings.length > 1 ? `of ${one.recording}` : null,
       onclick: () => {
         editor?.select(chosen ? null : key);
-        actions.goTo(start);
+        actions.chooseRecording(at, start);
       },
     },
     element("i", { class: "swatch", style: { background: `var(--kind-${kind || "none"})` } }),

@@ -218,8 +218,9 @@ export function createImport({ redraw, openDataset, opened }) {
       redraw();
     },
     lookAgain: () => ask({ ...request, mapping: mapping(), streams: null }, true),
-    chooseRecording: (index) => {
-      if (view.look) Object.assign(view, { recording: index, time: firstTime(view.look, index) });
+    chooseRecording: (index, time) => {
+      if (!view.look) return;
+      Object.assign(view, { recording: index, time: time ?? firstTime(view.look, index) });
       redraw();
     },
     goTo: (time) => {

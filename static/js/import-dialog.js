@@ -24,7 +24,7 @@ export function openImportDialog(file = null) {
 /**
  * Take what is dropped anywhere on the page: an archive alone is imported as a dataset, unless
  * `wanted` says otherwise; all else are recordings.
- * @param {(files: File[]) => void} takeRecordings
+ * @param {(files: File[], folders: string[]) => void} takeRecordings
  * @param {() => boolean} wanted whether archives are recordings too
  */
 export function importDroppedFiles(takeRecordings, wanted) {
@@ -32,11 +32,17 @@ export function importDroppedFiles(takeRecordings, wanted) {
     if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
   });
   window.addEventListener("drop", (event) => {
-    const files = [...(event.dataTransfer?.files ?? [])];
-    if (!files.length) return;
+    const folders = [...(event.dataTransfer?.items ?? [])]
+      .map((item) => item.webkitGetAsEntry())
+      .filter((entry) => entry?.isDirectory)
+      .map((entry) => entry?.name ?? "");
+    const files = [...(event.dataTransfer?.files ?? [])].filter(
+      ({ name }) => !folders.includes(name),
+    );
+    if (!files.length && !folders.length) return;
     event.preventDefault();
     if (files.length === 1 && ARCHIVE.test(files[0].name) && !wanted()) openImportDialog(files[0]);
-    else takeRecordings(files);
+    else takeRecordings(files, folders);
   });
 }
 

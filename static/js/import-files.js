@@ -3,6 +3,8 @@ import { element, icon } from "./dom.js";
 
 /** @import { ImportActions, ImportFile, ImportView } from "./types.js" */
 
+let typedPath = ""; // that was not added yet
+
 /**
  * Draw the step: all of it before a look, one line with what was looked at after.
  * @param {ImportView} view
@@ -160,6 +162,10 @@ function pathForm(actions) {
     autocomplete: "off",
     "aria-label": "Path on the server’s disk",
     "data-key": "path",
+    value: typedPath,
+    oninput: ({ target }) => {
+      typedPath = target.value;
+    },
   });
   return element(
     "form",
@@ -167,7 +173,9 @@ function pathForm(actions) {
       class: "import-path",
       onsubmit: (event) => {
         event.preventDefault();
-        if (path.value.trim()) actions.addPath(path.value.trim());
+        const given = path.value.trim();
+        typedPath = path.value = "";
+        if (given) actions.addPath(given);
       },
     },
     element("label", {}, "or a file or folder on the server’s disk", path),

@@ -2,7 +2,7 @@
 // panel.
 import { element } from "./dom.js";
 import { formatDuration } from "./format.js";
-import { needsForceFrame } from "./import-setup.js";
+import { needsForceFrame, takenStream } from "./import-setup.js";
 
 /** @import { CutEditor, ImportActions, ImportView } from "./types.js" */
 
@@ -75,6 +75,7 @@ export function finishSection(view, editor, actions, problems) {
       ),
     ),
     problems.name,
+    job?.kind === "import" ? jobSection(view, actions) : null,
     why ? element("p", { class: "import-hint", id: "import-obstacle" }, why) : null,
     problems.other,
     imported
@@ -105,7 +106,7 @@ export function finishSection(view, editor, actions, problems) {
 function obstacle(view, editor) {
   const { look } = view;
   if (!look) return null;
-  if (look.error) return "Choose the streams first: see above.";
+  if (!takenStream(view, "pose")) return "No stream is taken as the tool’s poses: step 2.";
   if (!look.setup_stated) return "State the setup first: step 3.";
   if (needsForceFrame(view)) return "State the axes of the forces first: above.";
   if (editor?.problems().length) return "A sequence has no valid name: step 4.";

@@ -21,11 +21,17 @@ import {
 import { drawTimeline, forgetView, pressKey, startLookTimeline } from "./look-timeline.js";
 import { addPanel, openedPanel, openPanel } from "./panels.js";
 
+/** @import { ServerError } from "./types.js" */
+
 /** @type {HTMLElement} */
 let box;
 /** @type {ReturnType<typeof createImport>} */
 let work;
 let waiting = false; // a drawing of the panel is due
+/** @type {ServerError | null} */
+let said = null; // the problem that was brought into sight
+/** @type {EventTarget | null} */
+let taken = null; // the field whose value was taken since the last drawing
 
 /**
  * Add the panel, its scene and its timeline.
@@ -51,6 +57,9 @@ export function startImports(openDataset) {
       field?.select();
     },
   });
+  box.addEventListener("change", ({ target }) => {
+    taken = target;
+  });
   window.addEventListener("keydown", onKeyDown, true);
   onLookSceneKey(onKeyDown);
   addResultOpener("look", "Open the look", openLook);
@@ -75,13 +84,22 @@ export function lookAtDataset(name) {
 }
 
 /**
- * Bring the panel to the front and take files that were dropped.
+ * Bring the panel to the front and take files that were dropped: a single .toml beside a look is
+ * its setup, all else are new recordings.
  * @param {File[]} files
+ * @param {string[]} folders names of folders among what was dropped, which cannot be sent
  */
-export function takeFiles(files) {
+export function takeFiles(files, folders) {
   openPanel("import");
+  const [first] = files;
+  if (work.recording() && files.length === 1 && first.name.endsWith(".toml")) {
+    first
+      .text()
+      .then((text) => work.actions.setSetup({ kind: "file", name: first.name, text }), toast);
+    return;
+  }
   if (work.view.look) work.actions.startOver();
-  work.actions.addFiles(files);
+  work.actions.addFiles(files, folders);
 }
 
 /** Show scene and timeline of the look in place of those of a run. */
@@ -132,17 +150,20 @@ function draw() {
         element("div", { class: "eyebrow" }, "Import"),
         element("h1", { class: "verdict" }, title()),
         filesSection(view, actions, at("files")),
-        jobSection(view, actions),
+        view.job?.kind === "import" ? null : jobSection(view, actions),
         streamsSection(view, actions, at("streams")),
         setupSection(view, actions, at("setup")),
         meaningSection(view, actions, at("meaning")),
-        cutSection(view, editor, work.sequences(recording?.name ?? ""), actions, at("cut")),
+        cutSection(view, editor, work.sequences, actions, at("cut")),
         finishSection(view, editor, actions, { name: at("name"), other: at("other") }),
       );
     } catch (problem) {
       fill(box, errorCard(problem));
     }
   });
+  if (view.problem && view.problem !== said)
+    box.querySelector("[data-problem]")?.scrollIntoView({ block: "center" });
+  said = view.problem;
 }
 
 /** @returns {string} */
@@ -163,9 +184,10 @@ function keepingFocus(drawPanel) {
     ? /** @type {HTMLElement} */ (document.activeElement)
     : null;
   const key = active?.dataset.key;
-  const typed = active instanceof HTMLInputElement && active.type === "text" ? active : null;
-  const marks = typed ? [typed.selectionStart, typed.selectionEnd] : null;
-  const value = typed?.value;
+  const typed = active instanceof HTMLInputElement && active.type !== "file" ? active : null;
+  const marks = typed?.type === "text" ? [typed.selectionStart, typed.selectionEnd] : null;
+  const value = typed === taken ? undefined : typed?.value;
+  taken = null;
   const closed = new Map(
     [...box.querySelectorAll("details")].map((one) => [summaryOf(one), one.open]),
   );
@@ -179,10 +201,9 @@ function keepingFocus(drawPanel) {
     box.querySelector(`[data-key="${CSS.escape(key)}"]`)
   );
   again?.focus({ preventScroll: true });
-  if (again instanceof HTMLInputElement && marks) {
-    if (value !== undefined && key === "path") again.value = value;
-    again.setSelectionRange(marks[0], marks[1]);
-  }
+  if (!(again instanceof HTMLInputElement)) return;
+  if (value !== undefined) again.value = value;
+  if (marks) again.setSelectionRange(marks[0], marks[1]);
 }
 
 /**
@@ -201,6 +222,7 @@ function onKeyDown(event) {
   const target = /** @type {Element | null} */ (event.target);
   if (target?.matches?.("input, select, textarea, pre")) return;
   if ([" ", "Enter"].includes(event.key) && target?.matches?.("button, summary, a")) return;
+  if (["Home", "End"].includes(event.key) && target && box.contains(target)) return;
   if (!pressKey(event)) return;
   event.preventDefault();
   event.stopImmediatePropagation();

@@ -1,6 +1,7 @@
 // Errors of an import, each at the step that it concerns.
 import { errorTitle } from "./api.js";
 import { element } from "./dom.js";
+import { capitalise } from "./format.js";
 
 /** @import { ServerError } from "./types.js" */
 
@@ -47,8 +48,9 @@ export function problemAt(problem, step, looked) {
   return element(
     "div",
     { class: "note-card bad", role: "alert", "data-problem": step },
-    element("strong", {}, errorTitle(problem)),
-    problem.message,
+    element("strong", {}, problem.kind ? errorTitle(problem) : "Something is missing"),
+    capitalise(problem.message),
+    step === "streams" && looked ? " On this page: choose it in the column “Taken as”." : null,
     where.length
       ? element(
           "div",

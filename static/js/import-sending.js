@@ -61,8 +61,13 @@ export function createFileList(view, redraw) {
   }
 
   return {
-    /** @param {Iterable<File>} files */
-    add: (files) => {
+    /**
+     * @param {Iterable<File>} files
+     * @param {string[]} [folders] names of folders, which cannot be sent
+     */
+    add: (files, folders = []) => {
+      for (const folder of folders)
+        put(folder, { problem: "a folder: pack it as .zip, or name its path below" });
       for (const file of files) {
         const control = new AbortController();
         const row = put(file.name, { size: file.size, cancel: () => control.abort() });

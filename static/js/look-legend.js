@@ -1,5 +1,6 @@
 // The legend of a look's scene: why points are kept or dropped, how many, and which are hidden.
 import { element, fill } from "./dom.js";
+import { keepFocus } from "./keep-focus.js";
 
 /** @import { CloudReason } from "./types.js" */
 
@@ -13,38 +14,37 @@ import { element, fill } from "./dom.js";
  */
 export function drawReasons(legend, reasons, counts, hidden, toggle) {
   legend.hidden = !reasons.length;
-  const focused = document.activeElement?.getAttribute("data-reason");
-  fill(
-    legend,
-    element("div", { class: "title" }, "Points of this cloud"),
-    element(
-      "ul",
-      { "aria-label": "Points of this cloud by reason" },
-      reasons
-        .filter(({ name }) => counts[name] || name === "kept")
-        .map(({ name, label, colour }) =>
-          element(
-            "li",
-            {},
+  keepFocus(legend, "data-reason", () =>
+    fill(
+      legend,
+      element("div", { class: "title" }, "Points of this cloud"),
+      element(
+        "ul",
+        { "aria-label": "Points of this cloud by reason" },
+        reasons
+          .filter(({ name }) => counts[name] || name === "kept")
+          .map(({ name, label, colour }) =>
             element(
-              "button",
-              {
-                type: "button",
-                "aria-pressed": String(!hidden.has(name)),
-                "data-reason": name,
-                title: hidden.has(name) ? `Show: ${label}` : `Hide: ${label}`,
-                onclick: () => toggle(name),
-              },
-              element("i", { class: "swatch", style: { background: cssColour(colour) } }),
-              element("span", {}, label),
-              element("b", {}, String(counts[name] ?? 0)),
+              "li",
+              {},
+              element(
+                "button",
+                {
+                  type: "button",
+                  "aria-pressed": String(!hidden.has(name)),
+                  "data-reason": name,
+                  title: hidden.has(name) ? `Show: ${label}` : `Hide: ${label}`,
+                  onclick: () => toggle(name),
+                },
+                element("i", { class: "swatch", style: { background: cssColour(colour) } }),
+                element("span", {}, label),
+                element("b", {}, String(counts[name] ?? 0)),
+              ),
             ),
           ),
-        ),
+      ),
     ),
   );
-  if (focused)
-    /** @type {HTMLElement | null} */ (legend.querySelector(`[data-reason="${focused}"]`))?.focus();
 }
 
 /**

@@ -1,6 +1,7 @@
 // The scene of a look: its viewer, the layers above it, and the legend of why points are dropped.
 import { post, toError } from "./api.js";
 import { byId, element, fill, icon, swatch } from "./dom.js";
+import { keepFocus } from "./keep-focus.js";
 import { drawReasons } from "./look-legend.js";
 import { pageId } from "./scene.js";
 import { subscribe, state } from "./store.js";
@@ -76,6 +77,7 @@ export function openLookScene() {
   if (!frame.src) frame.src = `/viser/${pageId()}-look`;
   frame.hidden = false;
   draw();
+  send();
 }
 
 export function closeLookScene() {
@@ -97,6 +99,12 @@ export function onLookSceneKey(listener) {
  * @param {{ id: string, look: Look, recording: LookRecording, time: number } | null} view
  */
 export function showInScene(view) {
+  if (
+    view?.look === wanted?.look &&
+    view?.recording === wanted?.recording &&
+    view?.time === wanted?.time
+  )
+    return;
   wanted = view;
   if (!view) answer = null;
   draw();
@@ -167,44 +175,47 @@ const isShown = (layer) =>
 
 function draw() {
   const views = { target: "reset", top: "top", front: "front", side: "side" };
-  fill(
-    bar,
-    element(
-      "div",
-      { class: "chips", role: "group", "aria-label": "Layers" },
-      Object.entries(LAYERS).map(([layer, label]) => {
-        const why = unavailableReason(layer);
-        return element(
-          "button",
-          {
-            class: "chip",
-            type: "button",
-            disabled: why !== null,
-            title: why ?? MEANINGS[layer],
-            "aria-pressed": String(isShown(layer) && why === null),
-            "data-look-layer": layer,
-            onclick: () => toggle(layer),
-          },
-          swatch(INK[layer]),
-          label,
-        );
-      }),
-    ),
-    element("div", { class: "spring" }),
-    element(
-      "div",
-      { class: "chips", role: "group", "aria-label": "View" },
-      Object.entries(views).map(([name, where]) =>
-        element(
-          "button",
-          {
-            class: "icon-button",
-            type: "button",
-            title: where === "reset" ? "Look at all of it" : `Look from the ${where}`,
-            "aria-label": where === "reset" ? "Look at all of it" : `Look from the ${where}`,
-            onclick: () => look(where),
-          },
-          icon(name),
+  keepFocus(bar, "data-look-layer", () =>
+    fill(
+      bar,
+      element(
+        "div",
+        { class: "chips", role: "group", "aria-label": "Layers" },
+        Object.entries(LAYERS).map(([layer, label]) => {
+          const why = unavailableReason(layer);
+          return element(
+            "button",
+            {
+              class: "chip",
+              type: "button",
+              disabled: why !== null,
+              title: why ?? MEANINGS[layer],
+              "aria-pressed": String(isShown(layer) && why === null),
+              "data-look-layer": layer,
+              onclick: () => toggle(layer),
+            },
+            swatch(INK[layer]),
+            label,
+          );
+        }),
+      ),
+      element("div", { class: "spring" }),
+      element(
+        "div",
+        { class: "chips", role: "group", "aria-label": "View" },
+        Object.entries(views).map(([name, where]) =>
+          element(
+            "button",
+            {
+              class: "icon-button",
+              type: "button",
+              title: where === "reset" ? "Look at all of it" : `Look from the ${where}`,
+              "aria-label": where === "reset" ? "Look at all of it" : `Look from the ${where}`,
+              "data-look-layer": `view ${where}`,
+              onclick: () => look(where),
+            },
+            icon(name),
+          ),
         ),
       ),
     ),
@@ -234,18 +245,15 @@ function noteText() {
 
 /** @param {string} layer */
 function toggle(layer) {
-  if (layers.has(layer)) layers.delete(layer);
+  const shown = isShown(layer);
+  if (shown) layers.delete(layer);
   else layers.add(layer);
+  if (shown && layer === "raw") layers.delete("cleaned");
   // The cloud is drawn once: as it was measured, or coloured by reason.
   if (layers.has(layer) && layer === "raw") layers.delete("cleaned");
   if (layers.has(layer) && layer === "cleaned") layers.delete("raw");
   localStorage.setItem(STORED, JSON.stringify([...layers]));
-  const focused = document.activeElement?.getAttribute("data-look-layer");
   draw();
-  if (focused)
-    /** @type {HTMLElement | null} */ (
-      bar.querySelector(`[data-look-layer="${focused}"]`)
-    )?.focus();
   send();
 }
 

@@ -1,5 +1,6 @@
 // The buttons above a look's timeline.
 import { element, fill, icon } from "./dom.js";
+import { keepFocus } from "./keep-focus.js";
 import { nearest } from "./look-timeline-readings.js";
 
 /** @import { CutEditor, CutSequence, LookRecording } from "./types.js" */
@@ -63,9 +64,6 @@ export function drawTools(box, host, acts, recording) {
       },
       icon(name),
     );
-  const focused = box.contains(document.activeElement)
-    ? /** @type {HTMLElement} */ (document.activeElement).dataset.act
-    : null;
   const recordings = host.recordings();
   const { t, shown } = recording.clouds ?? { t: [], shown: [] };
   const cloud = shown.length
@@ -74,54 +72,55 @@ export function drawTools(box, host, acts, recording) {
         time,
       )
     : null;
-  fill(
-    box,
-    recordings.length > 1
-      ? element(
-          "select",
-          {
-            "aria-label": "Recording",
-            onchange: ({ target }) => host.choose(target.selectedIndex),
-          },
-          recordings.map(({ name }) =>
-            element("option", { selected: name === recording.name }, name),
-          ),
-        )
-      : null,
-    element(
-      "div",
-      { class: "buttons" },
-      button("back", "Back to the cloud before (Left)", () => acts.step(-1)),
-      button("forth", "On to the next cloud (Right)", () => acts.step(1)),
-    ),
-    element(
-      "output",
-      { class: "clock" },
-      element("strong", {}, `${(time - recording.start).toFixed(2)} s`),
-    ),
-    cloud === null
-      ? null
-      : element("span", { class: "label" }, `cloud ${cloud + 1} of ${shown.length}`),
-    element("div", { class: "spring" }),
-    editor
-      ? element(
-          "div",
-          { class: "buttons" },
-          button("add", "Add a sequence at the cursor (N)", acts.add),
-          button("split", "Split the chosen sequence at the cursor (S)", acts.split, !inside),
-          button("bin", "Delete the chosen sequence (Delete)", acts.remove, !chosen),
-          button("undo", "Undo (Ctrl Z)", editor.undo, !editor.canUndo()),
-          button("redo", "Redo (Ctrl Shift Z)", editor.redo, !editor.canRedo()),
-        )
-      : null,
-    element(
-      "div",
-      { class: "buttons" },
-      button("minus", "Zoom out (−)", () => acts.zoom(1.5)),
-      button("plus", "Zoom in (+)", () => acts.zoom(1 / 1.5)),
-      button("fit", "Show all (0)", acts.fit),
+  keepFocus(box, "data-act", () =>
+    fill(
+      box,
+      recordings.length > 1
+        ? element(
+            "select",
+            {
+              "aria-label": "Recording",
+              "data-act": "recording",
+              onchange: ({ target }) => host.choose(target.selectedIndex),
+            },
+            recordings.map(({ name }) =>
+              element("option", { selected: name === recording.name }, name),
+            ),
+          )
+        : null,
+      element(
+        "div",
+        { class: "buttons" },
+        button("back", "Back to the cloud before (Left)", () => acts.step(-1)),
+        button("forth", "On to the next cloud (Right)", () => acts.step(1)),
+      ),
+      element(
+        "output",
+        { class: "clock" },
+        element("strong", {}, `${(time - recording.start).toFixed(2)} s`),
+      ),
+      cloud === null
+        ? null
+        : element("span", { class: "label" }, `cloud ${cloud + 1} of ${shown.length}`),
+      element("div", { class: "spring" }),
+      editor
+        ? element(
+            "div",
+            { class: "buttons" },
+            button("add", "Add a sequence at the cursor (N)", acts.add),
+            button("split", "Split the chosen sequence at the cursor (S)", acts.split, !inside),
+            button("bin", "Delete the chosen sequence (Delete)", acts.remove, !chosen),
+            button("undo", "Undo (Ctrl Z)", editor.undo, !editor.canUndo()),
+            button("redo", "Redo (Ctrl Shift Z)", editor.redo, !editor.canRedo()),
+          )
+        : null,
+      element(
+        "div",
+        { class: "buttons" },
+        button("minus", "Zoom out (−)", () => acts.zoom(1.5)),
+        button("plus", "Zoom in (+)", () => acts.zoom(1 / 1.5)),
+        button("fit", "Show all (0)", acts.fit),
+      ),
     ),
   );
-  if (focused)
-    /** @type {HTMLElement | null} */ (box.querySelector(`[data-act="${focused}"]`))?.focus();
 }

@@ -788,7 +788,7 @@ export interface ImportView {
 
 export interface ImportActions {
   redraw: () => void;
-  addFiles: (files: Iterable<File>) => void;
+  addFiles: (files: Iterable<File>, folders?: string[]) => void;
   addPath: (path: string) => void;
   removeFile: (key: number) => void;
   startLook: () => void;
@@ -800,7 +800,7 @@ export interface ImportActions {
   setSetup: (setup: ImportSetup) => void;
   setMeaning: (key: string, value: string) => void;
   lookAgain: () => void;
-  chooseRecording: (index: number) => void;
+  chooseRecording: (index: number, time?: number) => void;
   goTo: (time: number) => void;
   startImport: () => void;
   openDataset: (name: string) => void;

@@ -35,7 +35,11 @@ def test_command_line_is_understood(name: str, line: str) -> None:
     group: Any = typer.main.get_command(app)
     verb, *words = shlex.split(line)
     assert verb in group.commands, f"{name}: there is no verb {verb}"
-    known = {option for item in group.commands[verb].params for option in item.opts}
+    known = {
+        option
+        for item in group.commands[verb].params
+        for option in (*item.opts, *item.secondary_opts)
+    }
     unknown = [word for word in words if word.startswith("-") and word not in known]
     assert unknown == [], f"{name}: palpate {line}"
 

@@ -28,6 +28,11 @@ UNKNOWN_RADIUS = 0.003
 """Radius at which a tool is drawn whose own is not stated [m]."""
 MOST_SEGMENTS = 4000
 """Segments of the drawn path."""
+_UNCLEANED = "The clouds could not be related to the phantom, so they are not cleaned."
+_RELATED = {
+    "robot": "Nothing relates the robot to the camera",
+    "phantom": "Nothing relates the phantom to the camera",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,7 @@ class DrawnLook:
         picture: its figures, z upwards.
         cloud: number of the drawn cloud among the stored ones; None without.
         cloud_time: of it [s].
+        frame: of the scene.
         counts: points of it by reason, before it was thinned.
         cannot: for each requested layer that is not drawn the reason.
     """
@@ -45,6 +51,7 @@ class DrawnLook:
     picture: Picture
     cloud: int | None
     cloud_time: float | None
+    frame: str
     counts: dict[str, int]
     cannot: dict[str, str]
 
@@ -61,42 +68,49 @@ class LookDrawing:
     files: LookFiles
     look: dict[str, Any]
     _paths: dict[int, LookPath | None] = field(default_factory=dict)
+    _upright: dict[str, Transform] = field(default_factory=dict)
 
-    @cached_property
-    def upright(self) -> Transform:
-        """From the frame of the arrays to that of the scene, in which z is upwards."""
-        if self.look["frame"] == "phantom":
-            return Transform()
-        if (cloud := self._any_cloud()) is not None and self.look["frame"] == "camera":
+    def frame(self, view: LookView) -> str:
+        """Frame of the scene: that of the clouds; of the tool where no cloud is asked for."""
+        own: str = self.look["frame"]
+        tool: str = self.look["recordings"][self._number(view.recording)]["tool"]["frame"]
+        return own if own != "camera" or {"raw", "cleaned"} & set(view.layers) else tool
+
+    def upright(self, frame: str) -> Transform:
+        """From a frame of the arrays to the scene, in which z is upwards."""
+        if frame not in self._upright:
+            self._upright[frame] = self._turned(frame)
+        return self._upright[frame]
+
+    def _turned(self, frame: str) -> Transform:
+        if frame == "camera" and (cloud := self._any_cloud()) is not None:
             return as_seen(cloud)
         path = next((one for n in range(self._count) if (one := self._path(n))), None)
-        if path is None or not len(path.places):
+        if frame == "phantom" or path is None or not len(path.places):
             return Transform()
         low, high = path.places.min(axis=0), path.places.max(axis=0)
         return Transform(np.eye(3), -np.array([*(low + high)[:2] / 2, low[2]]))
 
-    @cached_property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corner (3,) [m] of what the camera is turned to, frame of the scene:
-        the stated surface, else most of a cloud, else the tool's path.
+    def bounds(self, frame: str) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest corner (3,) [m] of what the camera is turned to, in the scene: the
+        stated surface, else most of a cloud, else the tool's path.
         """
         points = np.zeros((1, 3))
-        if self.look["frame"] == "phantom" and self.surface is not None:
+        if frame == "phantom" and self.surface is not None:
             points = self.surface.vertices
-        elif (cloud := self._any_cloud()) is not None:
-            points = self.upright.apply(cloud)
+        elif frame == self.look["frame"] and (cloud := self._any_cloud()) is not None:
+            points = self.upright(frame).apply(cloud)
         elif (path := self._path(0)) is not None:
-            points = self.upright.apply(path.places)
+            points = self.upright(frame).apply(path.places)
         low, high = np.percentile(points, [3, 97], axis=0)
         middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.01)
         return middle - half, middle + half
 
-    @cached_property
-    def eye(self) -> FloatArray:
-        """Place (3,) [m] of the depth camera, frame of the scene."""
-        if self.look["eye"] is not None and self.look["frame"] == "phantom":
+    def eye(self, frame: str) -> FloatArray:
+        """Place (3,) [m] of the depth camera in the scene; in front where it is not known."""
+        if self.look["eye"] is not None and frame == "phantom":
             return np.array(self.look["eye"], dtype=float)
-        return np.asarray(self.upright.apply(np.zeros(3))) + np.array([0.0, -1.0, 0.0])
+        return np.array([0.0, -1.0, 0.0]) + self.upright(frame).translation
 
     @cached_property
     def surface(self) -> LookSurface | None:
@@ -109,8 +123,8 @@ class LookDrawing:
         cloud = self._any_cloud()
         if cloud is None:
             return 0.0
-        reach = float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
-        return float(max(size_of_points(cloud), 0.0025 * reach))
+        low, high = self.bounds(self.look["frame"])
+        return max(0.6 * size_of_points(cloud), 0.002 * float(np.linalg.norm(high - low)))
 
     def drawn(self, view: LookView) -> DrawnLook:
         """The picture of a view; Missing for a recording that the look does not have."""
@@ -128,20 +142,21 @@ class LookDrawing:
             if recording["clouds"]["counts"]:
                 names = [row["name"] for row in self.look["reasons"]]
                 counts = dict(zip(names, recording["clouds"]["counts"][number], strict=True))
-        figures |= self._tool(at, recording, view)
-        if "surface" in view.layers and self.surface is not None and not self._off("surface"):
+        frame = self.frame(view)
+        figures |= self._tool(at, view, frame)
+        if "surface" in view.layers and self.surface is not None and frame == "phantom":
             shape = self.surface
             figures["surface"] = SurfaceFigure(
                 float32(shape.vertices), shape.faces.astype(np.int64), colours.RAW, SURFACE_OPACITY
             )
         for layer in view.layers:
-            if why := self._cannot(layer, at, number):
+            if why := self._cannot(layer, at, number, frame):
                 cannot[layer] = why
         shown = Picture(number or 0, figures, points, None, None, ((0.0, 0.0, 0.0),))
-        return DrawnLook(shown, number, time, counts, cannot)
+        return DrawnLook(shown, number, time, frame, counts, cannot)
 
     def _cloud(self, cloud: ShownCloud, view: LookView) -> CloudFigure:
-        places = float32(self.upright.apply(cloud.points))
+        places = float32(self.upright(self.look["frame"]).apply(cloud.points))
         if "cleaned" not in view.layers or not self.look["cleaned"]:
             return CloudFigure(places, colours.MEASURED, self.point_size)
         names = [row["name"] for row in self.look["reasons"]]
@@ -149,48 +164,37 @@ class LookDrawing:
         kept = np.array([name not in view.hidden for name in names])[cloud.reason]
         return CloudFigure(places[kept], shades[cloud.reason[kept]], self.point_size)
 
-    def _tool(self, at: int, recording: dict[str, Any], view: LookView) -> dict[str, Figure]:
+    def _tool(self, at: int, view: LookView, frame: str) -> dict[str, Figure]:
         """The tool at the time of the view, and its path."""
         path = self._path(at)
-        if path is None or self._off(recording["tool"]["frame"]):
+        if path is None or self.look["recordings"][at]["tool"]["frame"] != frame:
             return {}
         figures: dict[str, Figure] = {}
         if "tool" in view.layers:
             radius = self.look["tool_radius"] or UNKNOWN_RADIUS
-            figures["tool"] = ToolFigure(self.upright.apply(path.at(view.time)), radius)
+            figures["tool"] = ToolFigure(self.upright(frame).apply(path.at(view.time)), radius)
         if "path" in view.layers:
             every = 1 + (len(path.time) - 1) // MOST_SEGMENTS
             reached = int(np.searchsorted(path.time[::every], view.time))
-            figures |= path_lines(self.upright.apply(path.places[::every]), reached)
+            figures |= path_lines(self.upright(frame).apply(path.places[::every]), reached)
         return figures
 
-    def _cannot(self, layer: LookLayer, at: int, number: int | None) -> str:
+    def _cannot(self, layer: LookLayer, at: int, number: int | None, frame: str) -> str:
         """The reason why a layer is not drawn; empty where it is."""
-        recording, frame = self.look["recordings"][at], self.look["frame"]
+        tool = self.look["recordings"][at]["tool"]["frame"]
+        apart = frame == "camera" and f"{_RELATED[tool]}: hide the clouds to see it."
         if layer in ("raw", "cleaned"):
-            if number is None:
-                return "There are no clouds in this recording."
-            raw = layer == "cleaned" and not self.look["cleaned"]
-            return (
-                "The clouds could not be related to the phantom, so they are not cleaned."
-                if raw
-                else ""
-            )
+            raw = _UNCLEANED if layer == "cleaned" and not self.look["cleaned"] else ""
+            return "There are no clouds in this recording." if number is None else raw
         if layer == "surface":
             if self.surface is None:
                 return "No phantom is stated."
-            return (
-                "" if frame == "phantom" else "Nothing relates the phantom to what is drawn here."
-            )
+            if tool == "phantom" and apart:
+                return apart
+            return "" if frame == "phantom" else "Nothing relates the phantom to the robot."
         if self._path(at) is None:
             return "There are no poses of the tool in this recording."
-        off = self._off(recording["tool"]["frame"])
-        return "Nothing relates the robot to the camera." if off else ""
-
-    def _off(self, frame: str) -> bool:
-        """Whether things of a frame, or the surface, cannot be drawn in that of the scene."""
-        own: str = self.look["frame"]
-        return {"surface": "phantom"}.get(frame, frame) != own
+        return "" if tool == frame else apart or "Nothing relates the robot to the phantom."
 
     def _number(self, name: str | None) -> int:
         names = [one["name"] for one in self.look["recordings"]]

@@ -40,12 +40,12 @@ class LookScene:
             self._shown = (drawing, view, drawn)
             for scene in self._scenes:
                 scene.draw(drawn.picture)
-            if before is None or before[1].look != view.look:
+            if before is None or (before[1].look, before[2].frame) != (view.look, drawn.frame):
                 self._look("reset")
             return {
                 "cloud": drawn.cloud,
                 "cloud_time": drawn.cloud_time,
-                "frame": drawing.look["frame"],
+                "frame": drawn.frame,
                 "counts": drawn.counts,
                 "points": drawn.picture.points,
                 "cannot": drawn.cannot,
@@ -76,8 +76,9 @@ class LookScene:
     def _look(self, where: Direction) -> None:
         if self._shown is None:
             return
-        drawing = self._shown[0]
-        viewpoint = viewpoint_for(*drawing.bounds, drawing.eye, ((0.0, 0.0, 0.0),), where)
+        drawing, _, drawn = self._shown
+        low, high = drawing.bounds(drawn.frame)
+        viewpoint = viewpoint_for(low, high, drawing.eye(drawn.frame), ((0.0, 0.0, 0.0),), where)
         for scene in self._scenes:
             scene.look(viewpoint)
 

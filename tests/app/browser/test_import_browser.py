@@ -99,9 +99,16 @@ class ImportPanel:
         self.tab.mouse.up()
 
     def look(self) -> dict[str, Any]:
-        identity = re.search(r"look=([^&]+)", self.tab.url)
-        assert identity is not None
-        found: dict[str, Any] = self.page.client.get(f"/api/looks/{identity[1]}").json()
+        """The look of the address; one that is being replaced is waited for."""
+        found: dict[str, Any] = {}
+
+        def there() -> bool:
+            identity = re.search(r"look=([^&]+)", self.tab.url)
+            answer = self.page.client.get(f"/api/looks/{identity[1] if identity else ''}")
+            found.update(answer.json() if identity and answer.status_code == 200 else {})
+            return bool(found)
+
+        self.page.until(there)
         return found
 
 
@@ -194,3 +201,29 @@ def test_what_cannot_be_looked_at_is_said_at_the_files(panel: ImportPanel, tmp_p
     tab.click("text=Look at them")
     tab.wait_for_selector("[data-problem=files] >> text=does not exist")
     panel.page.trouble[:] = [text for text in panel.page.trouble if "422" not in text]
+
+
+@pytest.mark.more
+def test_another_role_and_another_meaning_repeat_the_look(panel: ImportPanel, bag: Path) -> None:
+    tab = panel.tab
+    panel.open()
+    tab.set_input_files("input[name=recordings]", [bag, bag.parent / "dataset.toml"])
+    tab.wait_for_selector("[data-file='dataset.toml'][data-state=there]")
+    tab.click("text=Look at them")
+    panel.page.until(lambda: "drag-01" in panel.sequences())
+    tab.locator("[data-key='tip z']").fill("2")
+    tab.locator("[data-key='tip z']").press("Tab")
+    tab.click("text=Look again with these")
+    panel.page.until(lambda: "tool_tip = [0.0, 0.0, 0.002]" in panel.look()["mapping"])
+    tab.wait_for_selector("text=Look again with these", state="detached")
+    tab.select_option("[aria-label='Role of /ati']", "")
+    panel.page.until(lambda: panel.look()["recordings"][0]["force"] is None)
+    panel.idle()
+    assert tab.locator("[name=wrench-frame]").count() == 0
+    assert tab.get_by_role("button", name="Import", exact=True).is_enabled()
+    tab.select_option("[aria-label='Role of /PSM1/measured_cp']", "")
+    tab.wait_for_selector("[data-problem=streams]")
+    assert tab.get_by_role("button", name="Import", exact=True).is_disabled()
+    panel.picture("6-no-pose")
+    rows = panel.page.client.get("/api/looks")
+    assert [one["source"] is not None for one in rows.json()].count(True) == 1

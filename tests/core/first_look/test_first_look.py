@@ -158,6 +158,20 @@ def test_a_dataset_is_shown_by_its_sequences_with_the_reason_of_each_point(tmp_p
     assert np.abs(table[:, 2]).max() < 1e-3
 
 
+def test_times_of_a_dataset_are_seconds_however_rare_its_clouds(tmp_path: Path) -> None:
+    dataset = write_valid_dataset(tmp_path / "block")
+    table = dataset / "sequences" / "poke-01" / "kinematics.csv"
+    head, *rows = table.read_text().splitlines()
+    slow = [f"{100 + 10 * (float(row[:9]) - 100):.5f}{row[row.index(',') :]}" for row in rows]
+    table.write_text("\n".join([head, *slow]) + "\n")
+    clouds = [f"{100 + 2.1 * n:.3f},clouds/{n:06d}.ply" for n in range(5)]
+    table.with_name("clouds.csv").write_text("\n".join(["t,file", *clouds]) + "\n")
+    look = take_look(LookRequest(files=(dataset,)), tmp_path / "look")
+    poke = look["recordings"][1]
+    assert poke["clouds"]["t"] == pytest.approx([100.0, 102.1, 104.2, 106.3, 108.4])
+    assert not any("taken as" in one for one in look["warnings"])
+
+
 def test_roles_may_be_chosen_and_an_empty_name_takes_none(bench: Path, tmp_path: Path) -> None:
     request = LookRequest(files=(bench / "bench.bag",), streams={"wrench": ""})
     (one,) = take_look(request, tmp_path / "look")["recordings"]

@@ -12,8 +12,9 @@ from bench_recording import CORNERS, ROBOT_FROM_PHANTOM, BenchRecording, bench_s
 from palpate.dataset import open_dataset
 from palpate.foundation.errors import DatasetError
 from palpate.importing.cutting.split_proposal import proposed_splits
+from palpate.importing.cutting.rest_average import averaged_cloud
 from palpate.importing.import_notes import ImportNotes
-from palpate.importing.import_recording import import_recordings
+from palpate.importing.import_recording import chosen_splits, import_recordings
 from palpate.importing.mapping_file import read_mapping
 from palpate.importing.rules import ImportMapping, SequenceWindow, WrenchRules
 from palpate.importing.survey import survey
@@ -220,3 +221,31 @@ def test_a_tool_tip_moves_the_path_along_the_tools_axes(bag: Path, tmp_path: Pat
     apart = path.position - BenchRecording().motion()[2]
     np.testing.assert_allclose(np.linalg.norm(apart, axis=1), 0.01, atol=1e-6)
     assert np.ptp(apart, axis=0).max() > 0.003
+
+
+def test_large_images_are_averaged_as_a_whole_one_would_be() -> None:
+    rng = np.random.default_rng(0)
+    frames = rng.normal(0.4, 1e-3, (5, 70, 9, 3)).astype(np.float32)
+    frames[rng.random(frames.shape[:3]) < 0.3] = np.nan
+    points, how = averaged_cloud(list(frames))
+    often = np.isfinite(frames).all(axis=-1).mean(axis=0) >= 0.5
+    np.testing.assert_array_equal(points, np.nanmedian(frames[:, often], axis=0))
+    assert how == "median of 5 frames, pixel by pixel"
+
+
+def test_sequences_that_state_their_split_are_not_split_anew() -> None:
+    names = {"a": "test", "b": "", "c": "train", "d": "none"}
+    windows = [
+        SequenceWindow.model_validate(
+            {"name": name, "recording": "bench", "start": 0, "end": 1, "split": split}
+        )
+        for name, split in names.items()
+    ]
+    mapping = ImportMapping.model_validate(
+        {"name": "x", "recordings": [{"name": "bench", "files": ["a.bag"]}]}
+    )
+    notes = ImportNotes()
+    splits = chosen_splits(windows, mapping, notes)
+    assert splits == {"train": ["c"], "validation": [], "test": ["a"]} and not notes.decisions
+    proposed = chosen_splits(windows[1:2], mapping, notes)
+    assert proposed["train"] == ["b"] and len(notes.decisions) == 1
