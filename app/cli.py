@@ -13,10 +13,10 @@ from palpate.app.commands import (
     data,
     demo,
     diagnosis,
-    doctor,
     evaluation,
     export,
     importing,
+    looking,
     service,
     surface,
     sweeping,
@@ -41,7 +41,7 @@ app = typer.Typer(
 app.command()(demo.demo)
 app.command()(data.check)
 app.command("import")(importing.import_)
-app.command()(importing.look)
+app.command()(looking.look)
 app.command()(surface.surface)
 app.command()(data.register)
 app.command()(data.replay)
@@ -52,7 +52,7 @@ app.command()(evaluation.evaluate)
 app.command()(export.export)
 app.command()(blind.blind)
 app.command()(service.serve)
-app.command()(doctor.doctor)
+app.command()(service.doctor)
 
 
 def main() -> NoReturn:

@@ -1,4 +1,4 @@
-"""`palpate serve`: the page and the REST service."""
+"""`palpate serve`, the page and the REST service, and `palpate doctor`, what a maintainer asks for."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from palpate.app.commands.console import out
 from palpate.app.server.tokens import FILE, Token
 from palpate.app.settings import Settings
 
-__all__ = ["serve"]
+__all__ = ["announce", "doctor", "serve"]
 
 
 def serve(
@@ -75,3 +75,18 @@ def announce(address: str, path: str = "/") -> None:
     """Print the address of the page."""
     out.print(f"Palpate is at [bold]{address}{path}[/]  (Ctrl-C ends it)", highlight=False)
     out.file.flush()
+
+
+def doctor(
+    runs: Annotated[Path, typer.Option(help="Folder of finished diagnoses.")] = Path("runs"),
+) -> None:
+    """Print versions, machine, the settings of the last server, its last jobs and its log, without
+    data or results.
+    """
+    from palpate.app.server.diagnostics import diagnostics, noted_settings
+
+    settings = noted_settings(runs)
+    if settings is None:
+        settings = {"no server was started with these runs": "the defaults follow"}
+        settings |= Settings(runs=runs).model_dump(mode="json")
+    typer.echo(diagnostics(runs, settings), nl=False)

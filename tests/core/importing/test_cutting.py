@@ -11,8 +11,8 @@ from bench_recording import CORNERS, ROBOT_FROM_PHANTOM, BenchRecording, bench_s
 
 from palpate.dataset import open_dataset
 from palpate.foundation.errors import DatasetError
-from palpate.importing.cutting.split_proposal import proposed_splits
 from palpate.importing.cutting.rest_average import averaged_cloud
+from palpate.importing.cutting.split_proposal import proposed_splits
 from palpate.importing.import_notes import ImportNotes
 from palpate.importing.import_recording import chosen_splits, import_recordings
 from palpate.importing.mapping_file import read_mapping
