@@ -16,7 +16,7 @@ from palpate.app.commands import (
     evaluation,
     export,
     importing,
-    looking,
+    look_verb,
     service,
     surface,
     sweeping,
@@ -41,7 +41,7 @@ app = typer.Typer(
 app.command()(demo.demo)
 app.command()(data.check)
 app.command("import")(importing.import_)
-app.command()(looking.look)
+app.command()(look_verb.look)
 app.command()(surface.surface)
 app.command()(data.register)
 app.command()(data.replay)

@@ -1,4 +1,4 @@
-"""`palpate serve`, the page and the REST service, and `palpate doctor`, what a maintainer asks for."""
+"""`palpate serve`, the page and the REST service, and `palpate doctor`, for a maintainer."""
 
 from __future__ import annotations
 
