@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bench_recording import BenchRecording, SeenAs, bench_setup
+from recorded_bags import BagKind
 
 from palpate.dataset import Dataset, open_dataset
 from palpate.importing.import_notes import ImportNotes
@@ -19,7 +20,7 @@ STEP = 0.5e-3
 
 
 def imported(folder: Path, seen_as: SeenAs) -> Dataset:
-    kind = "mcap" if seen_as == "compressed" else "ros1"
+    kind: BagKind = "mcap" if seen_as == "compressed" else "ros1"
     bag = BenchRecording().write(
         folder / ("bench" if kind == "mcap" else "bench.bag"), kind, seen_as=seen_as
     )
