@@ -12,7 +12,7 @@ from bench_recording import BenchRecording
 from small_dataset import SIZE, write_valid_dataset
 
 from palpate.app.drawing import colours
-from palpate.app.drawing.figures import CloudFigure, SurfaceFigure, ToolFigure
+from palpate.app.drawing.figures import CloudFigure, LinesFigure, SurfaceFigure, ToolFigure
 from palpate.app.http_errors import Missing
 from palpate.app.scene.looks.look_scenes import LookScenes
 from palpate.app.scene.looks.look_view import LookView
@@ -94,7 +94,7 @@ def test_tool_path_and_surface_stand_where_the_recording_puts_them(scenes: LookS
     surface = picture.of(SurfaceFigure)["surface"]
     np.testing.assert_allclose(np.ptp(surface.vertices, axis=0), SIZE, atol=1e-6)
     assert surface.opacity < 0.5 and not picture.of(CloudFigure)
-    path = picture.figures["path"]
+    path = picture.of(LinesFigure)["path"]
     passed = (path.colour == colours.TOOL).all(axis=(1, 2))
     assert 0.45 < passed.mean() < 0.55 and passed[0] and not passed[-1]
     scenes.leave(PAGE, scene)
@@ -131,7 +131,8 @@ def test_what_cannot_be_drawn_of_a_recording_without_a_setup_is_said(scenes: Loo
     said = scenes.open(page).show(LookView(look="bench", layers=("tool", "path", "surface")))
     assert said["frame"] == "robot" and set(scene.pictures[-1].figures) == {"tool", "path"}
     assert said["cannot"] == {"surface": "No phantom is stated."} and len(scene.looked_from) == 2
-    assert scene.pictures[-1].figures["path"].segments[..., 2].min() == pytest.approx(0, abs=1e-6)
+    lines = scene.pictures[-1].of(LinesFigure)["path"]
+    assert lines.segments[..., 2].min() == pytest.approx(0, abs=1e-6)
     with pytest.raises(Missing, match="no recording none"):
         scenes.open(page).show(LookView(look="bench", recording="none"))
     with pytest.raises(Missing, match="no look gone"):
