@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from bench_recording import BenchRecording, bench_setup
 from browsing import NEEDS_CHROMIUM, Page
+from small_dataset import write_valid_dataset
 
 from palpate.app.settings import Settings
 from palpate.dataset import open_dataset
@@ -251,3 +252,23 @@ def test_another_role_and_another_meaning_repeat_the_look(panel: ImportPanel, ba
     panel.picture("6-no-pose")
     rows = panel.page.client.get("/api/looks")
     assert [one["source"] is not None for one in rows.json()].count(True) == 1
+
+
+@pytest.mark.more
+def test_a_dataset_is_looked_at_without_being_changed(panel: ImportPanel, tmp_path: Path) -> None:
+    write_valid_dataset(tmp_path / "datasets" / "small")
+    tab = panel.tab
+    tab.goto(str(panel.page.client.base_url))
+    tab.click("[aria-label='Look at small']")
+    panel.idle()
+    assert "A look at small" in tab.inner_text("#panel-import h1")
+    assert set(panel.sequences()) == {"poke-01", "drag-01"}
+    assert tab.locator("#panel-import select, #panel-import input").count() == 0
+    assert tab.locator("#look-timeline [data-act=add]").count() == 0
+    tab.reload()
+    panel.idle()
+    tab.click(".cut-line >> text=poke-01")
+    panel.page.until(lambda: tab.input_value("[data-act=recording]") == "poke-01")
+    tab.click("text=Open the dataset")
+    tab.wait_for_selector("#panel:visible >> text=Every file was read")
+    assert "look=" not in tab.url
