@@ -34,7 +34,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def panel(browser: Any, serve: Any, tmp_path: Path) -> Iterator[ImportPanel]:
     settings = Settings(runs=tmp_path / "runs", datasets=tmp_path / "datasets", preload=())
     settings.datasets.mkdir()
-    width, height = SIZES[os.environ.get("PALPATE_SIZE", "wide")]
+    width, height = SIZES[os.environ.get("PALPATE_SIZE", "small")]
     with (
         serve(settings) as client,
         browser.new_context(
@@ -139,6 +139,7 @@ def test_a_bag_is_looked_at_cut_by_hand_and_becomes_a_dataset(
     tab.select_option("[name=wrench-frame]", '"tool"')
     panel.picture("3-cut")
 
+    move_in_time(panel)
     edit(panel, found)
     edited = panel.sequences()
     panel.picture("4-edited")
@@ -157,6 +158,29 @@ def test_a_bag_is_looked_at_cut_by_hand_and_becomes_a_dataset(
     for name in ("first", "sequence-01"):
         times = made.sequence(name).kinematics.time
         assert times[-1] - times[0] == pytest.approx(edited[name][1] - edited[name][0], abs=0.15)
+
+
+def move_in_time(panel: ImportPanel) -> None:
+    """Click a time, zoom by the wheel, and show all again: scene and clock follow."""
+    tab = panel.tab
+    x, y = panel.pixel(40.0)
+    with tab.expect_request("**/looking") as asked:
+        tab.mouse.click(x, y - 60)
+    start = panel.look()["recordings"][0]["start"]
+    assert asked.value.post_data_json["time"] - start == pytest.approx(40.0, abs=0.2)
+
+    def clock() -> float:
+        return float(tab.inner_text("#look-timeline .clock").removesuffix(" s"))
+
+    panel.page.until(lambda: clock() == pytest.approx(40.0, abs=0.2))
+    tab.mouse.move(panel.pixel(20.0)[0], y - 60)
+    tab.mouse.wheel(0, -600)
+    tab.wait_for_timeout(200)
+    tab.mouse.click(x, y - 60)
+    panel.page.until(lambda: 22.0 < clock() < 36.0)
+    tab.keyboard.press("0")
+    tab.mouse.click(x, y - 60)
+    panel.page.until(lambda: clock() == pytest.approx(40.0, abs=0.2))
 
 
 def edit(panel: ImportPanel, found: dict[str, tuple[float, float]]) -> None:
