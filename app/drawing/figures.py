@@ -72,12 +72,13 @@ class LinesFigure:
 
 @dataclass(frozen=True, eq=False)
 class ToolFigure:
-    """A sphere with a short shaft upwards; centre (3,) and radius [m]."""
+    """A sphere with a short shaft, upwards or along `axis` (3,); centre (3,) and radius [m]."""
 
     centre: FloatArray
     radius: float
     opacity: float = 1.0
     at: Place = HERE
+    axis: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

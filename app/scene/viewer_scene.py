@@ -17,6 +17,7 @@ from palpate.app.drawing.figures import (
 )
 from palpate.app.scene.picture import Picture
 from palpate.app.scene.viewpoint import FIELD_OF_VIEW, Viewpoint
+from palpate.foundation.arrays import FloatArray
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -98,6 +99,8 @@ class ViserScene:
         node = self._nodes[name]
         if isinstance(figure, ToolFigure):
             node.position = figure.centre + figure.at
+            if figure.axis is not None:
+                node.wxyz = _turn_to(figure.axis)
             return
         node.position = figure.place + figure.at if isinstance(figure, LabelFigure) else figure.at
         if isinstance(figure, CloudFigure):
@@ -170,6 +173,13 @@ class ViserScene:
         return root
 
 
+def _turn_to(axis: FloatArray) -> FloatArray:
+    """Quaternion w, x, y, z of the shortest turn from z to a unit vector (3,)."""
+    half = np.array([1.0 + axis[2], -axis[1], axis[0], 0.0])
+    length = float(np.linalg.norm(half))
+    return half / length if length > 1e-6 else np.array([0.0, 1.0, 0.0, 0.0])
+
+
 def _node_key(figure: Figure) -> tuple[Any, ...]:
     """Properties that cannot be changed in an existing node."""
     if isinstance(figure, CloudFigure):
@@ -186,4 +196,4 @@ def _node_key(figure: Figure) -> tuple[Any, ...]:
         )
     if isinstance(figure, LabelFigure):
         return (LabelFigure, figure.text)
-    return (ToolFigure, figure.radius, figure.opacity)
+    return (ToolFigure, figure.radius, figure.opacity, figure.axis is None)

@@ -90,6 +90,7 @@ class _Look:
     error: PalpateError | None = None
     streams: list[list[dict[str, Any]]] = field(default_factory=list)
     spans: list[FloatArray] = field(default_factory=list)
+    shaft: FloatArray | None = None
 
     @property
     def of_dataset(self) -> bool:
@@ -116,6 +117,8 @@ class _Look:
         located = None
         if dataset is not None:
             located = located_camera(dataset, self.notes, part(report, 0.75, 0.85))
+            if located is not None and located.shaft is not None:
+                self.shaft = located.shaft.axis
             self.files.write_surface(*dataset.geometry.closed_surface)
         numbers = [
             {float(time / 1e9): at for at, time in enumerate(one.cloud_times.tolist())}
@@ -219,7 +222,10 @@ class _Look:
         timed = one.timed
         if one.has_poses:
             every = 1 + (len(timed.pose_times) - 1) // MOST_PLACES
-            self.files.write_path(at, LookPath(timed.time[::every], one.places()[::every]))
+            path = LookPath(
+                timed.time[::every], one.places()[::every], one.axes(self.shaft)[::every]
+            )
+            self.files.write_path(at, path)
         ends = [times[[0, -1]] for times in (timed.pose_times, timed.cloud_times) if len(times)]
         span = np.concatenate(ends) / 1e9 if ends else self.spans[at]
         return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +43,26 @@ class LookSurface:
 
 @dataclass(frozen=True, eq=False)
 class LookPath:
-    """Times (n,) [s] and tool centres (n, 3) [m] of one recording, phantom or robot frame."""
+    """Path of the tool in one recording, phantom or robot frame.
+
+    Attributes:
+        time: (n,) [s].
+        places: (n, 3) tool centres [m].
+        axes: (n, 3) unit vectors along the shaft; empty where it is not known.
+    """
 
     time: FloatArray
     places: FloatArray
+    axes: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def at(self, time: float) -> FloatArray:
         """The tool's centre (3,) [m] at a time [s]."""
         return np.array([np.interp(time, self.time, self.places[:, axis]) for axis in range(3)])
+
+    def axis_at(self, time: float) -> FloatArray | None:
+        """The shaft's direction (3,) next to a time [s]; None where it is not known."""
+        row = int(np.abs(self.time - time).argmin())
+        return self.axes[row] if len(self.axes) else None
 
 
 @dataclass(frozen=True)
@@ -82,7 +94,8 @@ class LookFiles:
 
     def write_path(self, recording: int, path: LookPath) -> None:
         """Write the path of the tool in a recording."""
-        np.savez(self.folder / f"path-{recording:03d}.npz", time=path.time, places=path.places)
+        place = self.folder / f"path-{recording:03d}.npz"
+        np.savez(place, time=path.time, places=path.places, axes=path.axes)
 
     def look(self) -> dict[str, Any]:
         """Content of look.json; RunError where it cannot be read."""
@@ -105,7 +118,7 @@ class LookFiles:
     def path(self, recording: int) -> LookPath | None:
         """The path of the tool in a recording; None without."""
         place = self.folder / f"path-{recording:03d}.npz"
-        return LookPath(*self._arrays(place, "time", "places")) if place.exists() else None
+        return LookPath(*self._arrays(place, "time", "places", "axes")) if place.exists() else None
 
     def _cloud(self, recording: int, number: int) -> Path:
         return self.folder / "clouds" / f"{recording:03d}-{number:06d}.npz"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from palpate.dataset.tool_motion import averaged_path
 from palpate.first_look.series import as_list, extreme_rows
@@ -68,6 +69,18 @@ class MotionSeries:
         if self.phantom is None:
             return self.timed.positions
         return self.phantom.in_phantom(self.timed)
+
+    def axes(self, along: FloatArray | None) -> FloatArray:
+        """Directions (n, 3) of the shaft at the poses, in the frame of `places`.
+
+        Args:
+            along: (3,) unit vector of the shaft in the tool's own frame; None where it is not
+                known, which gives (0, 3).
+        """
+        if along is None:
+            return np.zeros((0, 3))
+        turned = np.asarray(Rotation.from_quat(self.timed.quaternions).apply(along))
+        return turned if self.phantom is None else self.phantom.phantom_from_robot.rotate(turned)
 
     def tool(self) -> dict[str, Any]:
         """Path of the tool with its depth in the stated surface, as in look.json."""

@@ -172,7 +172,12 @@ class LookDrawing:
         figures: dict[str, Figure] = {}
         if "tool" in view.layers:
             radius = self.look["tool_radius"] or UNKNOWN_RADIUS
-            figures["tool"] = ToolFigure(self.upright(frame).apply(path.at(view.time)), radius)
+            axis = path.axis_at(view.time)
+            figures["tool"] = ToolFigure(
+                self.upright(frame).apply(path.at(view.time)),
+                radius,
+                axis=None if axis is None else self.upright(frame).rotate(axis),
+            )
         if "path" in view.layers:
             every = 1 + (len(path.time) - 1) // MOST_SEGMENTS
             reached = int(np.searchsorted(path.time[::every], view.time))

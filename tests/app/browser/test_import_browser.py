@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from bench_recording import BenchRecording, bench_setup
 from browsing import NEEDS_CHROMIUM, Page
+from small_dataset import write_valid_dataset
 
 from palpate.app.settings import Settings
 from palpate.dataset import open_dataset
@@ -34,7 +35,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def panel(browser: Any, serve: Any, tmp_path: Path) -> Iterator[ImportPanel]:
     settings = Settings(runs=tmp_path / "runs", datasets=tmp_path / "datasets", preload=())
     settings.datasets.mkdir()
-    width, height = SIZES[os.environ.get("PALPATE_SIZE", "wide")]
+    width, height = SIZES[os.environ.get("PALPATE_SIZE", "small")]
     with (
         serve(settings) as client,
         browser.new_context(
@@ -139,6 +140,7 @@ def test_a_bag_is_looked_at_cut_by_hand_and_becomes_a_dataset(
     tab.select_option("[name=wrench-frame]", '"tool"')
     panel.picture("3-cut")
 
+    move_in_time(panel)
     edit(panel, found)
     edited = panel.sequences()
     panel.picture("4-edited")
@@ -157,6 +159,29 @@ def test_a_bag_is_looked_at_cut_by_hand_and_becomes_a_dataset(
     for name in ("first", "sequence-01"):
         times = made.sequence(name).kinematics.time
         assert times[-1] - times[0] == pytest.approx(edited[name][1] - edited[name][0], abs=0.15)
+
+
+def move_in_time(panel: ImportPanel) -> None:
+    """Click a time, zoom by the wheel, and show all again: scene and clock follow."""
+    tab = panel.tab
+    x, y = panel.pixel(40.0)
+    with tab.expect_request("**/looking") as asked:
+        tab.mouse.click(x, y - 60)
+    start = panel.look()["recordings"][0]["start"]
+    assert asked.value.post_data_json["time"] - start == pytest.approx(40.0, abs=0.2)
+
+    def clock() -> float:
+        return float(tab.inner_text("#look-timeline .clock").removesuffix(" s"))
+
+    panel.page.until(lambda: clock() == pytest.approx(40.0, abs=0.2))
+    tab.mouse.move(panel.pixel(20.0)[0], y - 60)
+    tab.mouse.wheel(0, -600)
+    tab.wait_for_timeout(200)
+    tab.mouse.click(x, y - 60)
+    panel.page.until(lambda: 22.0 < clock() < 36.0)
+    tab.keyboard.press("0")
+    tab.mouse.click(x, y - 60)
+    panel.page.until(lambda: clock() == pytest.approx(40.0, abs=0.2))
 
 
 def edit(panel: ImportPanel, found: dict[str, tuple[float, float]]) -> None:
@@ -227,3 +252,23 @@ def test_another_role_and_another_meaning_repeat_the_look(panel: ImportPanel, ba
     panel.picture("6-no-pose")
     rows = panel.page.client.get("/api/looks")
     assert [one["source"] is not None for one in rows.json()].count(True) == 1
+
+
+@pytest.mark.more
+def test_a_dataset_is_looked_at_without_being_changed(panel: ImportPanel, tmp_path: Path) -> None:
+    write_valid_dataset(tmp_path / "datasets" / "small")
+    tab = panel.tab
+    tab.goto(str(panel.page.client.base_url))
+    tab.click("[aria-label='Look at small']")
+    panel.idle()
+    assert "A look at small" in tab.inner_text("#panel-import h1")
+    assert set(panel.sequences()) == {"poke-01", "drag-01"}
+    assert tab.locator("#panel-import select, #panel-import input").count() == 0
+    assert tab.locator("#look-timeline [data-act=add]").count() == 0
+    tab.reload()
+    panel.idle()
+    tab.click(".cut-line >> text=poke-01")
+    panel.page.until(lambda: tab.input_value("[data-act=recording]") == "poke-01")
+    tab.click("text=Open the dataset")
+    tab.wait_for_selector("#panel:visible >> text=Every file was read")
+    assert "look=" not in tab.url

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bench_recording import BenchRecording
+from scipy.spatial.transform import Rotation
 from small_dataset import SIZE, write_valid_dataset
 
 from palpate.app.drawing import colours
@@ -17,6 +18,7 @@ from palpate.app.http_errors import Missing
 from palpate.app.scene.looks.look_scenes import LookScenes
 from palpate.app.scene.looks.look_view import LookView
 from palpate.app.scene.picture import Picture
+from palpate.app.scene.viewer_scene import _turn_to
 from palpate.app.scene.viewpoint import Viewpoint
 from palpate.app.storage.look_store import LookStore
 from palpate.first_look.first_look import take_look
@@ -137,3 +139,9 @@ def test_what_cannot_be_drawn_of_a_recording_without_a_setup_is_said(scenes: Loo
         scenes.open(page).show(LookView(look="bench", recording="none"))
     with pytest.raises(Missing, match="no look gone"):
         scenes.open(page).show(LookView(look="gone"))
+
+
+def test_the_shaft_is_turned_as_the_clouds_show_it() -> None:
+    for axis in ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -0.6, 0.8], [0.0, 0.0, -1.0]):
+        w, *xyz = _turn_to(np.array(axis))
+        np.testing.assert_allclose(Rotation.from_quat([*xyz, w]).apply([0, 0, 1]), axis, atol=1e-9)
