@@ -7,6 +7,7 @@ numbers.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -33,6 +34,9 @@ DOUBTFUL = 5.0e-3
 """Residual of a pair beyond which a warning is given [m]; careful clicks miss by 1 to 2 mm."""
 MIRRORED = 0.5
 """RMS of a reflection over that of the best motion, below which pairs count as mirrored [1]."""
+STRAYED_SHIFT, STRAYED_TURN = 20e-3, math.radians(15.0)
+"""Motion by ICP beyond which pairs and surface contradict each other [m], [rad]; three clicks that
+miss by 2 mm over 40 mm turn the cloud by 3 degrees."""
 COUNTED = 4.0e-3
 """Distance to block or table after ICP up to which points count in the stated residuals [m]."""
 
@@ -98,6 +102,20 @@ class PairRegistration:
             np.linalg.norm(motion.rotation_vector)
         )
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Doubts about pairs and fit, one sentence each."""
+        shift, turn = self.moved
+        strayed: tuple[str, ...] = ()
+        if shift > STRAYED_SHIFT or turn > STRAYED_TURN:
+            strayed = (
+                f"ICP moved the cloud by {1e3 * shift:.1f} mm and turned it by "
+                f"{math.degrees(turn):.0f} degrees from where the pairs put it (at most "
+                f"{1e3 * STRAYED_SHIFT:.0f} mm and {math.degrees(STRAYED_TURN):.0f} degrees "
+                "expected): a pair joins the wrong places, or the surface looks alike from there",
+            )
+        return (*strayed, *self.pairs.warnings, *self.camera.warnings)
+
     def to_json(self) -> dict[str, Any]:
         """Plain values: lengths in metres, angles in radians, the directions from the weakest to
         the firmest.
@@ -115,7 +133,7 @@ class PairRegistration:
             "turned": turn,
             "weak_directions": list(self.camera.weak_directions),
             "directions": directions(self.camera.covariance, self.camera.lever),
-            "warnings": [*self.pairs.warnings, *self.camera.warnings],
+            "warnings": list(self.warnings),
         }
 
 

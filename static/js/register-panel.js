@@ -35,7 +35,11 @@ export function drawPanel(box, editor, view, actions) {
   fill(
     box,
     element("div", { class: "eyebrow" }, "Registration by hand"),
-    element("h1", { class: "verdict" }, heading(editor, view)),
+    element(
+      "h1",
+      { class: isDoubtful(editor) && !view.busy ? "verdict doubtful" : "verdict" },
+      heading(editor, view),
+    ),
     view.datasets.length
       ? null
       : element(
@@ -113,6 +117,13 @@ export function drawPanel(box, editor, view, actions) {
 }
 
 /**
+ * Say whether a result is there that has a doubt.
+ * @param {PairEditor | null} editor
+ * @returns {boolean}
+ */
+const isDoubtful = (editor) => Boolean(editor?.values.found?.registration.warnings.length);
+
+/**
  * @param {PairEditor | null} editor
  * @param {RegisterView} view
  * @returns {string}
@@ -124,7 +135,8 @@ function heading(editor, view) {
   const count = completePairs(pairs).length;
   if (found) {
     const { residual_before: before, residual_after: after } = found.registration;
-    return `${formatMm(before)} before, ${formatMm(after)} after ICP`;
+    const change = `${formatMm(before)} before, ${formatMm(after)} after ICP`;
+    return isDoubtful(editor) ? `Doubtful: ${found.registration.warnings[0]}` : change;
   }
   if (view.problem) return "These pairs do not fit yet";
   if (view.fit) return `${count} pairs fit to ${formatMm(view.fit.rms)} RMS`;
@@ -398,16 +410,18 @@ function resultPart({ registration: found }, view, actions, name) {
               : "",
           ),
     ),
-    found.warnings.length
+    found.warnings.length > 1
       ? element(
           "section",
           {},
-          element("h2", {}, "Doubtful"),
-          found.warnings.map((text) => element("div", { class: "note-card" }, text)),
+          element("h2", {}, "Doubtful, too"),
+          found.warnings.slice(1).map((text) => element("div", { class: "note-card" }, text)),
         )
       : null,
     view.refused ? errorCard(view.refused) : null,
-    ...(view.accepted ? acceptedPart(view, actions) : [acceptForm(view, actions, name)]),
+    ...(view.accepted
+      ? acceptedPart(view, actions)
+      : [acceptForm(view, actions, found.warnings.length > 0, name)]),
   ];
 }
 
@@ -443,10 +457,11 @@ const acceptedPart = (view, actions) => [
 /**
  * @param {RegisterView} view
  * @param {RegisterActions} actions
+ * @param {boolean} doubtful whether accepting is the second choice
  * @param {string} [name]
  * @returns {HTMLElement}
  */
-const acceptForm = (view, actions, name) =>
+const acceptForm = (view, actions, doubtful, name) =>
   element(
     "form",
     {
@@ -474,18 +489,38 @@ const acceptForm = (view, actions, name) =>
     element(
       "div",
       { class: "actions" },
-      element(
-        "button",
-        { class: "button strong", type: "submit", disabled: Boolean(view.busy) },
-        view.busy ? "Working …" : "Accept",
-      ),
-      element(
-        "button",
-        { class: "button", type: "button", title: "Esc", onclick: actions.back },
-        "Back to the pairs",
+      inOrder(
+        doubtful,
+        element(
+          "button",
+          {
+            class: doubtful ? "button" : "button strong",
+            type: "submit",
+            disabled: Boolean(view.busy),
+          },
+          view.busy ? "Working …" : doubtful ? "Accept all the same" : "Accept",
+        ),
+        element(
+          "button",
+          {
+            class: doubtful ? "button strong" : "button",
+            type: "button",
+            title: "Esc",
+            onclick: actions.back,
+          },
+          "Back to the pairs",
+        ),
       ),
     ),
   );
+
+/**
+ * @param {boolean} swapped
+ * @param {HTMLElement} first
+ * @param {HTMLElement} second
+ * @returns {HTMLElement[]}
+ */
+const inOrder = (swapped, first, second) => (swapped ? [second, first] : [first, second]);
 
 /**
  * Return a name that is not taken.

@@ -109,3 +109,13 @@ def test_the_start_is_not_doubted_as_a_stated_guess(scene):
     result = register_pairs(view.cloud, Box(size=SIZE), start.inverse().apply(MESH), MESH)
     assert not any("from [camera] to_phantom" in text for text in result.to_json()["warnings"])
     assert result.moved[0] == pytest.approx(0.016, abs=5e-4)
+
+
+def test_a_cloud_that_icp_turns_away_from_the_pairs_is_doubted(scene):
+    view = scene().look(seed=6)
+    start = small_motion(np.array([0.0, 0.0, 0.0, 0.0, 0.0, np.radians(24.0)]), TOP) @ view.pose
+    result = register_pairs(view.cloud, Box(size=SIZE), start.inverse().apply(MESH), MESH)
+    assert result.moved[1] > np.radians(15.0)
+    assert "from where the pairs put it" in result.to_json()["warnings"][0]
+    good = register_pairs(view.cloud, Box(size=SIZE), view.pose.inverse().apply(MESH), MESH)
+    assert not any("from where the pairs put it" in text for text in good.warnings)
